@@ -24,15 +24,15 @@ def check_division(whole: Whole, survey: Survey, division: Division, rules: Rule
     """
     for role, cells in (("macro", division.macro), ("meso", division.meso)):
         if not cells.any():
-            raise CouplingError(empty_model_message(role, whole, rules))
+            raise CouplingError(_empty_model_message(role, whole, rules))
     if division.scheme in BUFFERED and not division.overlaps:
-        check_buffer(whole, survey, division, rules)
+        _check_buffer(whole, survey, division, rules)
     if division.scheme == "local_steps":
-        check_linear(survey, division, rules)
-    check_steps(whole, survey, division, rules)
+        _check_linear(survey, division, rules)
+    _check_steps(whole, survey, division, rules)
 
 
-def empty_model_message(role: str, whole: Whole, rules: Rules) -> str:
+def _empty_model_message(role: str, whole: Whole, rules: Rules) -> str:
     """Return why a model has no cell, and possible remedies, as text."""
     if role == "meso":
         return (
@@ -46,7 +46,7 @@ def empty_model_message(role: str, whole: Whole, rules: Rules) -> str:
     )
 
 
-def check_buffer(whole: Whole, survey: Survey, division: Division, rules: Rules) -> None:
+def _check_buffer(whole: Whole, survey: Survey, division: Division, rules: Rules) -> None:
     """Check that layers of board separate the interface from finer cells; raises as ``check_division``.
 
     A joint on an element that touches the interface makes the window unstable (tests/stability/test_fem_window.py), and
@@ -59,19 +59,19 @@ def check_buffer(whole: Whole, survey: Survey, division: Division, rules: Rules)
         roles = ", ".join(np.unique(survey.role[foreign]).tolist())
         raise CouplingError(
             f"elements that touch the interface must belong to the board, found {np.sum(foreign)} of {roles}, the first"
-            f" {location_of(whole, foreign)}; try coupling.scheme = local_steps, which allows this interface"
+            f" {_location_of(whole, foreign)}; try coupling.scheme = local_steps, which allows this interface"
         )
     layers = rules.coupling.buffer_layers
     close = division.macro & grow_region(cells, seeds_of(whole, ~rules.coarse), rules.coarse, layers)
     if close.any():
         raise CouplingError(
             f"{np.sum(close)} elements of the macro model are too close to the joints, the first"
-            f" {location_of(whole, close)}: at least two layers of board elements must lie between"
+            f" {_location_of(whole, close)}: at least two layers of board elements must lie between"
             f" (coupling.buffer_layers = {layers})"
         )
 
 
-def check_linear(survey: Survey, division: Division, rules: Rules) -> None:
+def _check_linear(survey: Survey, division: Division, rules: Rules) -> None:
     """Check that elements with local steps are linear and lightly damped; raises as ``check_division``."""
     unsupported = division.meso & ~survey.linear
     if unsupported.any():
@@ -88,7 +88,7 @@ def check_linear(survey: Survey, division: Division, rules: Rules) -> None:
         )
 
 
-def check_steps(whole: Whole, survey: Survey, division: Division, rules: Rules) -> None:
+def _check_steps(whole: Whole, survey: Survey, division: Division, rules: Rules) -> None:
     """Check every step against the critical steps of its elements; raises as ``check_division``."""
     for name, step, cells, critical in steps_of(whole, survey, division, rules):
         above = cells & (step > (1.0 + ROUNDING) * rules.fraction * critical)
@@ -97,7 +97,7 @@ def check_steps(whole: Whole, survey: Survey, division: Division, rules: Rules) 
             raise CouplingError(
                 f"{name} of {step:.4g} s is above step_fraction = {rules.fraction:g} of the critical step of"
                 f" {np.sum(above)} elements ({', '.join(np.unique(survey.role[above]).tolist())}), the first"
-                f" {location_of(whole, above)}: at most {rules.fraction * lowest:.4g} s is stable"
+                f" {_location_of(whole, above)}: at most {rules.fraction * lowest:.4g} s is stable"
             )
 
 
@@ -140,7 +140,7 @@ def check_pulses(durations: Iterable[float], window: float, fraction: float) -> 
         )
 
 
-def location_of(whole: Whole, cells: NDArray[np.bool_]) -> str:
+def _location_of(whole: Whole, cells: NDArray[np.bool_]) -> str:
     """Return the centre of the first selected cell as text."""
     centre = whole.mesh.points[whole.mesh.cells[np.argmax(cells)]].mean(axis=0)
     return f"near ({', '.join(f'{value:.6g}' for value in centre)}) m"

@@ -79,13 +79,13 @@ def choose_levels(
         return np.zeros(len(cells), np.int32), ()
     order = np.argsort(needed)
     cost = np.concatenate([[0.0], np.cumsum(limits.cost[order])])
-    candidates = list(all_ratios(limits, limits.window / needed.min(), (), most))
+    candidates = list(_all_ratios(limits, limits.window / needed.min(), (), most))
     if not candidates:
         raise LevelError(
             f"the window {limits.window:.3e} s is {limits.window / needed.min():.3g} times the smallest step of an"
             f" element, {needed.min():.3e} s; allowed: {LARGEST_RATIO} steps per level and {most} levels"
         )
-    ratios = candidates[int(np.argmin(window_costs(candidates, needed[order], cost, limits)))]
+    ratios = candidates[int(np.argmin(_window_costs(candidates, needed[order], cost, limits)))]
     return np.sum(needed[:, None] < least_steps(ratios, limits)[:-1], axis=1, dtype=np.int32), ratios
 
 
@@ -114,7 +114,7 @@ def reach_of(ratio: int, level: int, damping: float) -> float:
     return Substeps.of(ratio, level, damping).reach
 
 
-def all_ratios(limits: StepLimits, needed: float, inner: tuple[int, ...], most: int) -> Iterator[tuple[int, ...]]:
+def _all_ratios(limits: StepLimits, needed: float, inner: tuple[int, ...], most: int) -> Iterator[tuple[int, ...]]:
     """Yield the ratios of one to ``most`` levels that divide a window into at least ``needed`` steps.
 
     Args:
@@ -130,10 +130,10 @@ def all_ratios(limits: StepLimits, needed: float, inner: tuple[int, ...], most: 
             yield (*inner, ratio)
             return
         if most > 1 and needed / ratio <= LARGEST_RATIO ** (most - 1):
-            yield from all_ratios(limits, needed / ratio, (*inner, ratio), most - 1)
+            yield from _all_ratios(limits, needed / ratio, (*inner, ratio), most - 1)
 
 
-def window_costs(
+def _window_costs(
     candidates: list[tuple[int, ...]], needed: NDArray[np.float64], cost: NDArray[np.float64], limits: StepLimits
 ) -> NDArray[np.float64]:
     """Return the predicted cost of a window for each candidate, for element updates and substeps.

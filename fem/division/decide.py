@@ -146,7 +146,7 @@ def divide_estimate(estimate: MeshEstimate, rules: Rules) -> Division:
     return replace(division, why=choice.why)
 
 
-def slow_rows(rules: Rules) -> NDArray[np.bool_]:
+def _slow_rows(rules: Rules) -> NDArray[np.bool_]:
     """Return the rows of an estimated mesh that take the window, shape (n,).
 
     They are the board, or in one-way coupling all rows of the driving model.
@@ -156,10 +156,10 @@ def slow_rows(rules: Rules) -> NDArray[np.bool_]:
 
 def plan_estimate(estimate: MeshEstimate, rules: Rules) -> WindowPlan:
     """Return windows and substeps of an estimated mesh, with the substeps of a DNS."""
-    return plan_windows(rules, slow_rows(rules), estimate.steps)
+    return plan_windows(rules, _slow_rows(rules), estimate.steps)
 
 
 def longest_window(estimate: MeshEstimate, rules: Rules) -> float:
     """Return the longest window [s] that the elements of an estimated mesh allow, for runs of any duration."""
-    slow = damped_critical_step(estimate.steps[slow_rows(rules)], rules.stiffness)
+    slow = damped_critical_step(estimate.steps[_slow_rows(rules)], rules.stiffness)
     return rules.fraction * float(slow.min())

@@ -42,16 +42,16 @@ def with_path_levels(division: Division, limits: StepLimits, around: Around, mos
         level = finer.level(ratios)
         return float(limits.cost @ np.array([0, *counts])[level]) + SUBSTEP_COST * float(counts.sum())
 
-    ratios = min(candidates(plan.substeps, min(MOST_LEVELS, most)), key=cost)
+    ratios = min(_candidates(plan.substeps, min(MOST_LEVELS, most)), key=cost)
     return replace(division, level=finer.level(ratios), ratios=ratios, plan=replace(plan, substeps=math.prod(ratios)))
 
 
-def candidates(substeps: int, most: int) -> Iterator[tuple[int, ...]]:
+def _candidates(substeps: int, most: int) -> Iterator[tuple[int, ...]]:
     """Yield ratios of one to ``most`` levels whose product is the smallest that reaches ``substeps``."""
     yield (substeps,)
     if most > 1:
         for first in range(1, substeps):
-            for inner in candidates(-(-substeps // first), most - 1):
+            for inner in _candidates(-(-substeps // first), most - 1):
                 if inner[0] > 1:
                     yield (first, *inner)
 

@@ -106,7 +106,7 @@ def survey(mesh: MeshData, materials: Materials | Mapping[str, Material], treatm
     return Survey(
         role=role,
         plain_step=step,
-        factor=mass_factors(step, scaled, treatment),
+        factor=_mass_factors(step, scaled, treatment),
         mass=elements.density * geometry.volume,
         linear=linear,
         cost=np.where(linear, np.where(box, 1.0, BOARD_ADVANTAGE), BOARD_ADVANTAGE * UPDATES_PER_SECOND / rate),
@@ -127,7 +127,7 @@ def add_spring_stiffness(
     return replace(survey, plain_step=2.0 / np.sqrt((2.0 / survey.plain_step) ** 2 + added_frequency))
 
 
-def mass_factors(step: NDArray[np.float64], scaled: NDArray[np.bool_], treatment: Treatment) -> NDArray[np.float64]:
+def _mass_factors(step: NDArray[np.float64], scaled: NDArray[np.bool_], treatment: Treatment) -> NDArray[np.float64]:
     """Return the density factor that raises critical steps to those of unscaled elements or to a limit, shape (ne,).
 
     Args:

@@ -18,11 +18,11 @@ def facet_set(mesh: MeshData, name: str) -> NDArray[np.int32]:
     Raises:
         LoadError: The mesh has no such set, or it is empty.
     """
-    check_facet_set(mesh.facets, name)
+    _check_facet_set(mesh.facets, name)
     return mesh.facets[name]
 
 
-def check_facet_set(facets: Mapping[str, Sequence] | Mapping[str, NDArray], name: str) -> None:
+def _check_facet_set(facets: Mapping[str, Sequence] | Mapping[str, NDArray], name: str) -> None:
     """Check that a facet set exists and is not empty.
 
     Raises:

@@ -94,7 +94,7 @@ def peaks_of(accelerations: Mapping[str, Acceleration], low_pass: LowPass) -> di
     return peaks | {"acceleration_filter": {"value": low_pass.label, "unit": ""}} if accelerations else {}
 
 
-def base_displacement(
+def _base_displacement(
     time: NDArray[np.float64], problem: StructureProblem, pulses: Mapping[str, Pulse]
 ) -> NDArray[np.float64]:
     """Return the displacement of the supports, shape (n, 3) [m], at times, shape (n,) [s]."""
@@ -119,7 +119,7 @@ def watch_accelerations(
     time, low_pass = arrays["time"], problem.dynamics.filter
     if not is_sampled(time, low_pass):
         return {}
-    base = base_displacement(time, problem, pulses)
+    base = _base_displacement(time, problem, pulses)
     shaken = [np.array(load.direction) for load in problem.loads.values() if isinstance(load, InputG)]
     accelerations = {}
     for name, point in problem.watch.items():

@@ -38,7 +38,7 @@ def gauge_lengths(table: PointTable) -> dict[str, float]:
     return dict(zip(table.gauges.names, table.gauges.length.tolist(), strict=True))
 
 
-def strain_rate(time: NDArray[np.float64], strain: NDArray[np.float64], low_pass: LowPass) -> NDArray[np.float64]:
+def _strain_rate(time: NDArray[np.float64], strain: NDArray[np.float64], low_pass: LowPass) -> NDArray[np.float64]:
     """Return the rate of a filtered strain, shape (n,) [1/s], at equally spaced times, shape (n,) [s]."""
     step = float(time[-1] - time[0]) / (len(time) - 1)
     return np.gradient(apply_low_pass(strain, step, low_pass), step)
@@ -52,7 +52,7 @@ def gauge_metrics(arrays: Mapping[str, NDArray], low_pass: LowPass) -> dict[str,
         strain = arrays[f"gauge@{name}"]
         metrics[f"peak_strain@{name}"] = quantity(float(np.abs(strain).max()))
         if sampled:
-            rate = strain_rate(arrays["time"], strain, low_pass)
+            rate = _strain_rate(arrays["time"], strain, low_pass)
             metrics[f"peak_strain_rate@{name}"] = quantity(float(np.abs(rate).max()), "1/s")
     return metrics
 

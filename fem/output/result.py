@@ -157,10 +157,10 @@ def health(
         **more,
         "added_mass_fraction": (steps.added_mass / steps.model_mass, ADDED_MASS_LIMIT),
     }
-    return make_checks(checks | hourglass_check(outcome.history, request.formulation))
+    return make_checks(checks | _hourglass_check(outcome.history, request.formulation))
 
 
-def hourglass_check(history: History, formulation: str) -> dict[str, tuple[float, float]]:
+def _hourglass_check(history: History, formulation: str) -> dict[str, tuple[float, float]]:
     """Return the hourglass energy relative to the largest energy, and its limit; empty without hourglass energy.
 
     One-point elements are not checked, because their hourglass energy includes the bending of layers.

@@ -43,7 +43,11 @@ def _table(table: dict) -> Table:
 
 
 def write(runs: Sequence[ComparedRun], path: Path) -> None:
-    """Write the page.
+    """Write the HTML page of a comparison; an existing page of this command is replaced.
+
+    Args:
+        runs: Two or more runs.
+        path: File to write.
 
     Raises:
         CaseError: The file exists and was not written by this command, or its folder does not exist.

@@ -198,7 +198,11 @@ def _reference_widths(drop: Droplet, ends: Floats) -> "list[Series]":
 
 
 def plan_rows(drop: Droplet) -> list[Row]:
-    """Return the dimensionless numbers of a droplet and its state at rest."""
+    """Return the dimensionless numbers of a droplet and its state at rest, as rows of ``plan``.
+
+    Returns:
+        Quantity, value and remark of each row, as text.
+    """
     rows = [("Ohnesorge number", f"{drop.ohnesorge:.3g}", "viscosity / surface tension")]
     if drop.impact_speed:
         rows.append(("Weber number", f"{drop.weber_number:.3g}", from_si(drop.impact_speed, "m/s", digits=3)))

@@ -114,7 +114,11 @@ def _describe_known(error: BaseException, where: Path | None) -> str:
 
 
 def describe_text(text: str) -> str:
-    """Return a plain description of a library message about exhausted resources, or an empty string."""
+    """Return a plain description of a library message about exhausted resources, or an empty string.
+
+    Args:
+        text: Message of a library.
+    """
     return next((words for pattern, words in LIBRARY_ERRORS if pattern.search(text)), "")
 
 
@@ -171,7 +175,7 @@ def run_app(app: Callable[..., Any]) -> None:
 
 
 def report_error(error: BaseException) -> int:
-    """Print an error in one line, write its details to a file, and return the exit code."""
+    """Print an error in one line on standard error, write its traceback to a file, and return the exit code."""
     if is_interrupt(error):
         _print_error("interrupted")
         return FAILED

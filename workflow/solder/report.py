@@ -64,7 +64,11 @@ def _add_body(run_folder: Path, context: dict, summary: dict) -> "tuple[JointSha
 
 
 def vertical_axis(points: np.ndarray) -> np.ndarray:
-    """Return the horizontal centre of a body's bounding box, shape (3,) [m], with z = 0."""
+    """Return the horizontal centre of a body's bounding box, shape (3,) [m], with z = 0.
+
+    Args:
+        points: Points of the body, shape (n, 3) [m].
+    """
     return 0.5 * (points.min(axis=0) + points.max(axis=0)) * np.array([1.0, 1.0, 0.0])
 
 
@@ -90,7 +94,8 @@ def history_curve(history: Mapping[str, np.ndarray], moves: bool) -> list[Chart]
     """Return charts of size, energy, capillary number and time step, and of the force of a pull.
 
     Args:
-        history: Arrays of the shape's history.
+        history: Arrays of shape (k,) by name: ``time`` [s], ``step``, ``height``, ``width`` [m], ``energy`` [J],
+            ``capillary_number``, ``time_step`` [s] and, for a pull, ``pull`` [N].
         moves: Whether the liquid has inertia. Without it, the charts are over steps, since times have no meaning.
     """
     axis, x = (TIME, history["time"] / MILLI) if moves else (Axis("step"), history["step"])
@@ -113,7 +118,12 @@ def history_curve(history: Mapping[str, np.ndarray], moves: bool) -> list[Chart]
 
 
 def pull_chart(history: Mapping[str, np.ndarray]) -> Chart:
-    """Return the chart of pulling and equilibrium force, over the standoff, or over time if it is fixed."""
+    """Return the chart of pulling and equilibrium force, over the standoff, or over time if it is fixed.
+
+    Args:
+        history: Arrays of shape (k,) by name: ``time`` [s], ``standoff`` [m], ``pull`` and ``pull_exact`` [N]; nan
+            where no equilibrium is known.
+    """
     standoff, (axis, x) = history["standoff"], (TIME, history["time"] / MILLI)
     if np.ptp(standoff) > 1e-6 * standoff.max():
         axis, x = Axis("standoff [mm]"), standoff / MILLI
@@ -128,8 +138,9 @@ def path_curve(positions: Sequence[Mapping]) -> list[Chart]:
     """Return charts of force and widths of a joint along the path of the package.
 
     Args:
-        positions: Results at each position of the package; the x axis is the first of standoff, offset and tilt that
-            varies.
+        positions: Records of the joint at each position of the package: ``standoff``, ``offset`` [m], ``tilt`` [rad],
+            ``axial_force``, ``axial_force_exact`` [N], ``waist``, ``max_width`` [m]; None where unknown. The x axis is
+            the first of standoff, offset and tilt that varies.
     """
     axis_of = {"standoff": ("standoff [mm]", MILLI), "offset": ("offset [mm]", MILLI), "tilt": ("tilt [deg]", DEGREE)}
     name = next((name for name in axis_of if positions[0][name] != positions[-1][name]), "standoff")
@@ -154,7 +165,12 @@ def path_curve(positions: Sequence[Mapping]) -> list[Chart]:
 
 
 def oscillation_curve(history: Mapping[str, np.ndarray], metrics: Mapping[str, dict]) -> list[Chart]:
-    """Return charts of the second mode's amplitude, with Reid's solution for small amplitude, and of the energies."""
+    """Return charts of the second mode's amplitude, with Reid's solution for small amplitude, and of the energies.
+
+    Args:
+        history: Arrays of shape (k,) by name: ``time`` [s], ``amplitude`` over the radius, energies [J].
+        metrics: Name -> record with ``value`` (SI) and ``unit``: period and decay rate with their errors.
+    """
     time, value = history["time"], {name: metric["value"] for name, metric in metrics.items()}
     period = value["period"] / (1.0 + value["period_error"])
     decay = value["decay_rate"] / (1.0 + value["decay_rate_error"])

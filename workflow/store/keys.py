@@ -23,7 +23,7 @@ class Change:
 
 
 def stage_inputs(case: Case, stage: Stage) -> dict:
-    """Return the parameters that a stage depends on, as dotted key -> SI value, and digests of its files."""
+    """Return the inputs that a stage depends on: dotted key -> SI value, and ``<key>.sha256`` -> digest of a file."""
     contents = [(f"{key}.sha256", _digest(path)) for key, path in case.files.items()]
     return {key: value for key, value in [*_flat(case.model_dump(mode="json")), *contents] if stage.depends_on(key)}
 
@@ -47,7 +47,10 @@ def product_key(case: Case, stage: Stage, inputs: dict, follows: Sequence[str | 
         case: The case.
         stage: Stage that makes the product.
         inputs: Parameters of the stage, as returned by ``stage_inputs``.
-        follows: Product keys of the stages that it follows.
+        follows: Product keys of the stages that it follows, in order.
+
+    Returns:
+        First hexadecimal digits of a SHA-256.
     """
     content = {"version": __version__, "stage": f"{case.kind} {stage.name}", "inputs": inputs, "follows": follows}
     return digest_of(content)[:DIGITS]
@@ -64,7 +67,15 @@ def digest_of(content: dict) -> str:
 
 
 def compare(old: dict, new: dict) -> tuple[Change, ...]:
-    """List the keys whose values differ between two sets of inputs, in the order of the new set."""
+    """List the keys whose values differ between two sets of inputs, in the order of the new set, then of the old one.
+
+    Args:
+        old: Dotted key -> value, as from ``stage_inputs``.
+        new: Dotted key -> value.
+
+    Returns:
+        Key, old and new value; None for a key that a set lacks.
+    """
     keys = [*new, *(key for key in old if key not in new)]
     return tuple(Change(key, old.get(key), new.get(key)) for key in keys if old.get(key) != new.get(key))
 

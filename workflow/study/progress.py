@@ -30,6 +30,9 @@ def progress_reporter(
         jobs: Missing products.
         bar: Progress bar.
         at_first: Function that is called once, with the first complete point.
+
+    Returns:
+        Function without arguments, to be called every second.
     """
     begin = time.monotonic()
     first = [at_first]

@@ -12,7 +12,15 @@ UNSOUND = "{} of {} points failed a check; they count in the means."
 
 
 def ranking(study: Study, rows: Sequence[Row]) -> dict:
-    """Return the table of healthy points, the best first; of keys that vary together only the first is listed."""
+    """Return the table of healthy points, the best first; of keys that vary together only the first is listed.
+
+    Args:
+        study: Study with its factors, metrics and goal.
+        rows: Results of the points.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text).
+    """
     metrics = study.metrics
     keys = [factor.keys[0] for factor in study.design.factors]
     head = ["rank", "point", *_short(keys), *(name.replace("_", " ") for name in metrics)]
@@ -40,7 +48,14 @@ def effects(study: Study, rows: Sequence[Row]) -> list[tuple[str, str, list[Main
 
 
 def effect_table(effects: Sequence[tuple[str, str, Sequence[MainEffect]]]) -> dict:
-    """Return the table of main effects, for each metric the largest first."""
+    """Return the table of main effects, for each metric the largest first.
+
+    Args:
+        effects: Metric, its unit and its main effects, see ``effects``.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text).
+    """
     return {
         "head": ["factor", "metric", "effect", "rank correlation", "p-value"],
         "rows": [
@@ -65,7 +80,14 @@ def imbalance(rows: Sequence[Row]) -> str:
 
 
 def troubles(rows: Sequence[Row]) -> dict:
-    """Return the table of failed, impossible and unhealthy points."""
+    """Return the table of failed, impossible and unhealthy points.
+
+    Args:
+        rows: Results of the points.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text) and ``prose``.
+    """
     return {
         "head": ["settings", "point", "result", "reason"],
         "prose": True,
