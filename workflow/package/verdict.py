@@ -23,9 +23,9 @@ def verdict_of(failure: Failure, history: Arrays, critical: str, coarse: Collect
 
     Args:
         failure: Limits, and the law of life.
-        history: Arrays of ``history.npz`` of the run.
+        history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity.
         critical: Joint that is reported if the case sets no limits.
-        coarse: Joints with the coarse mesh, whose values are approximate.
+        coarse: Names of joints with the coarse mesh, whose values are approximate.
 
     Returns:
         Record of the verdict. ``design`` is the verdict on the package and ``joint`` the joint that decides it.
@@ -77,7 +77,7 @@ def answer(verdict: dict, error: float | None) -> str:
     """Return the verdict in one line.
 
     Args:
-        verdict: Record of ``verdict_of``.
+        verdict: Record of ``verdict_of``, of which ``design`` and the deciding joint are written.
         error: Relative discretisation error of the deciding measure; None if unknown.
     """
     joint = verdict["joints"][verdict["joint"]]
@@ -134,7 +134,14 @@ def _text(value: float, unit: str) -> tuple[str, str]:
 
 
 def limits_table(failure: Failure) -> dict | None:
-    """Return the limits and the law of life with their sources; None without limits."""
+    """Return the table of the limits and the law of life with their sources.
+
+    Args:
+        failure: Limits of the case.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text); None without limits and without a law of life.
+    """
     rows = [
         [name.replace("_", " "), quantity({"value": limit.limit, "unit": MEASURES[name].unit}), limit.source]
         for name, limit in failure.limits.items()
