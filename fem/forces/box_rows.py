@@ -46,7 +46,12 @@ class BoxRows:
 
 
 def lines(points: NDArray[np.float64], cells: NDArray[np.int32]) -> NDArray[np.int64]:
-    """Return the nodes of the boxes line by line along the first coordinate, with neighbouring lines close together."""
+    """Return the nodes of boxes line by line along x, neighbouring lines close together, shape (p,).
+
+    Args:
+        points: Nodes, shape (n, 3) [m].
+        cells: Boxes, shape (ne, 8); bit d of a local index is the side in coordinate direction d.
+    """
     first = np.arange(len(points))
     first[cells[:, 1::2].ravel()] = cells[:, ::2].ravel()
     while np.any(first != first[first]):

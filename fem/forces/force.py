@@ -81,7 +81,15 @@ def force_terms(
 def terms_of(
     elements: Elements, chosen: NDArray[np.bool_], materials: Sequence[Material], kinematics: Kinematics, step: float
 ) -> list[ForceTerm]:
-    """Return the force terms of the elements ``chosen (ne,)``; other arguments as ``force_terms``."""
+    """Return the force terms of selected elements, numbered as all elements.
+
+    Args:
+        elements: Elements of this rank.
+        chosen: Whether an element is selected, shape (ne,).
+        materials: Material of each index of ``elements.elasticity``.
+        kinematics: Small, corotational or finite.
+        step: Time step of rate-dependent laws [s]; infinity means quasi-static.
+    """
     plastic = np.array([plastic_constants(material) for material in materials])
     elastic = chosen & ~np.isfinite(plastic[elements.material, FIRST_YIELD])
     linear = elastic if kinematics == "small" else np.zeros_like(elastic)
@@ -106,7 +114,11 @@ def _ufl_terms(elements: Elements, laws: "Mapping[int, Law]") -> list[ForceTerm]
 
 
 def linear_terms(elements: Elements) -> list[ForceTerm]:
-    """Return the force terms of elastic elements with small rotations, with shared stiffnesses of boxes."""
+    """Return the force terms of linear elastic elements at small rotations: one for boxes, one for all others.
+
+    Args:
+        elements: Elements of this rank; may be empty.
+    """
     box = in_rows(elements)
     terms: list[ForceTerm] = []
     if box.any():

@@ -55,7 +55,12 @@ class AssembledElements:
 
 
 def upper_pattern(cells: NDArray[np.int32], count: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Return row pointers and sorted columns of the upper triangle of the node graph of ``count`` nodes."""
+    """Return row pointers (count + 1,) and sorted columns (nb,) of the upper triangle of the node graph.
+
+    Args:
+        cells: Nodes of each element, shape (ne, k).
+        count: Number of nodes.
+    """
     membership = scipy.sparse.csr_matrix(
         (np.ones(cells.size, np.int32), (cells.ravel(), np.repeat(np.arange(len(cells)), cells.shape[1]))),
         shape=(count, len(cells)),

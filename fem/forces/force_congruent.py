@@ -108,7 +108,7 @@ def in_rows(elements: Elements) -> NDArray[np.bool_]:
 
 
 def align_boxes(elements: Elements) -> Elements:
-    """Return boxes renumbered so that bit d of a local index is the side in coordinate direction d."""
+    """Return a copy of boxes whose nodes are reordered so that bit d of a local index is the side in direction d."""
     corners = elements.points[elements.cells]
     upper = corners > 0.5 * (corners.min(axis=1, keepdims=True) + corners.max(axis=1, keepdims=True))
     order = np.argsort(upper @ np.array([1, 2, 4]), axis=1)

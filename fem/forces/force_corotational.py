@@ -217,7 +217,12 @@ Corotational = CorotationalBoxes | CorotationalBlocks | CorotationalHexahedra
 
 
 def corotational_terms(everything: Elements, chosen: NDArray[np.bool_]) -> list[Corotational]:
-    """Return the terms of the hexahedra with ``chosen (ne,)`` true: one for boxes and one for other shapes."""
+    """Return the force terms of selected hexahedra: one for boxes and one for other shapes; empty if none is selected.
+
+    Args:
+        everything: All elements of this rank.
+        chosen: Whether an element is selected, shape (ne,).
+    """
     box = is_box(everything.points[everything.cells])
     boxes, others = np.flatnonzero(chosen & box), np.flatnonzero(chosen & ~box)
     terms: list[Corotational] = [corotational_boxes(everything, boxes)] if len(boxes) else []
@@ -225,7 +230,12 @@ def corotational_terms(everything: Elements, chosen: NDArray[np.bool_]) -> list[
 
 
 def corotational_boxes(everything: Elements, chosen: NDArray[np.int64]) -> CorotationalBoxes | CorotationalBlocks:
-    """Return the term of the boxes numbered ``chosen (ne,)``: in rows, or in blocks if the rows are short."""
+    """Return one force term of selected boxes: in rows, or in blocks of sixteen if the rows are short.
+
+    Args:
+        everything: All elements of this rank.
+        chosen: Numbers of the boxes among them, shape (k,).
+    """
     rows = CorotationalBoxes.build(everything, chosen)
     return rows if len(chosen) >= SHORT_ROWS * len(rows.rows) else CorotationalBlocks.build(everything, chosen)
 

@@ -263,7 +263,12 @@ def view_by_lane(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def elastic_energy(blocks: AnyBlocks, elasticity: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the elastic energy s : C^-1 : s / 2 of each lane ``(nb, 16)`` [J]."""
+    """Return the elastic energy s : C^-1 : s / 2 of each element of each block, shape (nb, 16) [J].
+
+    Args:
+        blocks: Elements in blocks of sixteen, with stresses and volumes; elements after the last one repeat it.
+        elasticity: Elasticity of each material, shape (nm, 6, 6) [Pa].
+    """
     points = blocks.state.shape[1]
     stress = blocks.state.reshape(len(blocks.state), points, -1, LANES)[:, :, :6]
     strain = np.einsum("bij,bmjl->bmil", np.linalg.inv(elasticity)[blocks.material], stress, optimize=True)

@@ -59,7 +59,12 @@ class Lanes:
 
 
 def arrange(elements: Elements, group: NDArray[np.integer]) -> Lanes:
-    """Sort elements into blocks, each within one ``group (ne,)``, with equal shapes together."""
+    """Sort elements into blocks of sixteen, each within one group, with equal shapes together.
+
+    Args:
+        elements: Elements of one kind.
+        group: Group of each element, such as its material, shape (ne,).
+    """
     first, shape = classes(replace(elements, density=np.zeros(len(elements.cells))))
     order = np.lexsort((elements.cells.min(axis=1), shape, group))
     ends = np.flatnonzero(np.diff(group[order], append=-1)) + 1
@@ -70,7 +75,14 @@ def arrange(elements: Elements, group: NDArray[np.integer]) -> Lanes:
 
 
 def in_blocks(order: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """Return the elements of each block ``(nb, 16)``, the last one repeated, and their numbers ``(nb,)``."""
+    """Split elements into blocks of sixteen.
+
+    Args:
+        order: Numbers of the elements, at least one, shape (k,).
+
+    Returns:
+        Elements of each block, the last one repeated, shape (nb, 16), and number of elements per block, shape (nb,).
+    """
     padded = np.arange(-(-len(order) // LANES) * LANES)
     filled = np.minimum(len(order) - padded[::LANES], LANES)
     return order[np.minimum(padded, len(order) - 1)].reshape(-1, LANES), filled.astype(np.int32)
