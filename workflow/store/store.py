@@ -127,7 +127,7 @@ def reads(products: Mapping[str, Path], case: Case, stage: Stage) -> dict[str, s
 
 
 def write_case(folder: Path, case: Case) -> None:
-    """Write the resolved case into a run folder unless the same file exists."""
+    """Write the resolved case as JSON, with its digest, into a run folder unless the same file exists."""
     path, content = folder / CASE, case.model_dump(mode="json")
     text = json.dumps(content | {SEAL: digest_of(content)}, indent=1) + "\n"
     if path.is_file() and path.read_bytes() == text.encode():
