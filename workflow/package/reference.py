@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 KEY = "shock.failure.reference.run"
 STAGE = "shock"
 RUNS = Path("runs")  # where a case runs without --out
-ALLOWED = "the folder of a complete run of a dropped package, or its case file"
+ALLOWED = "folder of a complete run of a dropped package, or its case file, relative to the folder of this case file"
 
 
 def located(shock: dict, folder: Path) -> None:
