@@ -159,5 +159,5 @@ def test_a_run_does_not_replace_its_own_reference(base):
 
 
 def test_values_out_of_range_are_refused(base):
-    with pytest.raises(CaseError, match="largest_ratio.*out of range"):
+    with pytest.raises(CaseError, match=r"largest_ratio.*out of range"):
         read(base.folder, "shock.failure.reference.largest_ratio=0")
