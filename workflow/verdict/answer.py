@@ -5,7 +5,7 @@ from typing import Any
 
 from reflowshock.workflow.case.text import number
 from reflowshock.workflow.verdict.criteria import BY_NAME, JOINT_LIMITS
-from reflowshock.workflow.verdict.criterion import FAIL, value_text
+from reflowshock.workflow.verdict.criterion import FAIL, margin_text, value_text
 from reflowshock.workflow.verdict.joint_limits import MEASURES
 
 NAMED = 12  # failed joints that a sentence names at most
@@ -39,7 +39,7 @@ def judged_text(record: Record) -> str:
     """
     criterion = BY_NAME[record["name"]]
     label = f", {criterion.label}" if criterion.label else ""
-    margin = "" if record["margin"] is None else f" (margin {record['margin']:.2g}{label})"
+    margin = "" if record["margin"] is None else f" (margin {margin_text(record['margin'])}{label})"
     limit = value_text(record["limit"], record["unit"])[0]
     value = "unlimited" if record["value"] is None else " ".join(value_text(record["value"], record["unit"])).strip()
     joint = f" of {record['joint']}" if "joint" in record else ""
@@ -71,7 +71,7 @@ def against_limit(joint: Record) -> str:
     value = " ".join(value_text(joint["value"], unit))
     if joint["limit"] is None:
         return f"{words} {value}"
-    margin = "" if joint["margin"] is None else f" (margin {joint['margin']:.2g})"
+    margin = "" if joint["margin"] is None else f" (margin {margin_text(joint['margin'])})"
     return f"{words} {value} of {value_text(joint['limit'], unit)[0]}{margin}"
 
 
@@ -100,8 +100,8 @@ def criteria_table(verdict: Record) -> dict:
     for record in verdict["criteria"]:
         if not record["applies"] and not (record["name"] == "life" and "life" in verdict):
             others.setdefault(record["why"], []).append(BY_NAME[record["name"]].words)
-    note = "; ".join(f"{', '.join(names)}: {why}" for why, names in others.items())
-    return {"head": head, "rows": rows, "prose": True, "note": f"Not applied: {note}." if note else ""}
+    note = "; ".join(f"{', '.join(names)} ({why})" for why, names in others.items())
+    return {"head": head, "rows": rows, "prose": True, "note": f"Not judged: {note}." if note else ""}
 
 
 def _cells(record: Record) -> list[str]:

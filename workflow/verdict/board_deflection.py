@@ -22,7 +22,7 @@ from reflowshock.workflow.board_drop.duration import bending_axis
 from reflowshock.workflow.board_drop.fittings import spans
 from reflowshock.workflow.package.case import BoardDropCase
 from reflowshock.workflow.report.histories import peaks_late
-from reflowshock.workflow.verdict.criterion import Criterion, JudgedDrop, Judgement, length_text
+from reflowshock.workflow.verdict.criterion import Criterion, JudgedDrop, Judgement, length_text, margin_text
 
 INCH = 0.0254  # [m]
 SHOCK = 6.0  # 3 for the number of cycles, 2 without stress concentration
@@ -155,4 +155,4 @@ def _across(case: BoardDropCase, axis: int, margin: float | None) -> str:
     if margin is None:
         return ""
     edge = (case.board.length, case.board.width)[1 - axis]
-    return f"; margin {margin:.2g} with B = {length_text(edge)}, the board's {EDGES[1 - axis]}"
+    return f"; margin {margin_text(margin)} with B = {length_text(edge)}, the board's {EDGES[1 - axis]}"

@@ -131,6 +131,11 @@ def value_text(value: float, unit: str) -> tuple[str, str]:
     return f"{factor * value:.3g}", display_unit
 
 
+def margin_text(margin: float) -> str:
+    """Return a margin with two digits."""
+    return f"{margin:.2g}" if margin < 99.5 else f"{margin:.0f}"
+
+
 def length_text(length: float) -> str:
     """Return a length [m] with three digits in millimetres."""
     return f"{1e3 * length:.3g} mm"

@@ -28,7 +28,7 @@ class JointLimit(Criterion):
 
     def judge(self, drop: JudgedDrop) -> Judgement:
         """Judge the joint with the smallest margin."""
-        why = f"no limit given: shock.failure.{self.name}.limit"
+        why = f"needs shock.failure.{self.name}.limit"
         return worst(self.judge_joints(drop)) or Judgement(self.name, unit=self.measure.unit, why=why)
 
     def judge_joints(self, drop: JudgedDrop) -> list[Judgement]:
@@ -55,7 +55,7 @@ class DropLife(Criterion):
         """Judge the joint that fails first."""
         life = drop.failure.life
         if life is None:
-            return Judgement(self.name, why="no law given: shock.failure.life")
+            return Judgement(self.name, why="needs shock.failure.life")
         record = life_of(life, drop.history)
         if life.required is None:
             why = "informative: shock.failure.life.required is not given"

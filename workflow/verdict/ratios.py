@@ -60,13 +60,13 @@ class ReferenceRatio(Criterion):
     @property
     def words(self) -> str:  # type: ignore[override]
         """Name in reports."""
-        return f"{RATIOS[self.metric]} relative to the reference"
+        return f"{RATIOS[self.metric]} over the reference"
 
     def judge(self, drop: JudgedDrop) -> Judgement:
         """Judge the ratio to the reference of the case."""
         given = drop.failure.reference
         if given is None or drop.reference is None:
-            return Judgement(self.name, why="no reference design given: shock.failure.reference.run")
+            return Judgement(self.name, why="needs shock.failure.reference.run")
         ratio = ratio_of(self.metric, drop.metrics, drop.reference)
         if ratio.value is None:
             return Judgement(self.name, why=ratio.why)

@@ -7,6 +7,7 @@ import pytest
 
 from reflowshock.fem.problem.failure import Failure
 from reflowshock.parameters import changed
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.verdict.answer import answer, criteria_table, failing
 from reflowshock.workflow.verdict.criteria import CRITERIA
@@ -142,7 +143,7 @@ def test_the_worst_of_all_criteria_decides():
     )
     table = criteria_table(verdict)
     assert [row[0] for row in table["rows"]] == ["board strain", "peel of A2", "board deflection"]
-    assert "von Mises: no limit given: shock.failure.layer_von_mises.limit" in table["note"]
+    assert "von Mises (needs shock.failure.layer_von_mises.limit)" in table["note"]
     assert "Steinberg" in table["rows"][2][-1] and table["rows"][0][-1] == "us"
 
 
@@ -154,7 +155,7 @@ def test_each_criterion_has_a_formula_and_a_range_and_the_program_names_its_sour
 
 
 def test_the_strain_criterion_says_why_the_standard_is_left_out():
-    assert "IPC/JEDEC-9704 is not built in" in of(judged(), "board_strain")["why"]
+    assert "IPC/JEDEC-9704 is left out" in of(judged(), "board_strain")["why"]
 
 
 def test_a_structure_is_not_judged_and_says_why():
@@ -168,3 +169,12 @@ def test_verdicts_are_written_as_json():
     assert verdict["design"] == FAIL
     contract = {"name", "value", "limit", "unit", "margin", "source", "applies", "why"}
     assert all(contract <= set(record) for record in verdict["criteria"])
+
+
+def test_a_limit_of_strain_has_a_unit_and_a_source():
+    text = 'shock.failure.board_strain={ limit = "500 um/m", source = "maker of the package" }'
+    assert read_case(SMALL_CASE, [text]).shock.failure.board_strain.limit == pytest.approx(5e-4)
+    with pytest.raises(CaseError, match=r"board_strain\.limit"):
+        read_case(SMALL_CASE, [text.replace(" um/m", " mm")])
+    with pytest.raises(CaseError, match=r"board_strain\.source.*is missing"):
+        read_case(SMALL_CASE, ['shock.failure.board_strain={ limit = "500 um/m" }'])
