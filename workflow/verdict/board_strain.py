@@ -21,8 +21,8 @@ class BoardStrain(Criterion):
         value, limit = drop.value(METRIC), drop.failure.board_strain
         if limit is None or value is None:
             why = (
-                "needs shock.failure.board_strain.limit; IPC/JEDEC-9704 is left out, because its formula was found in no two"
-                " public texts and its revision A of 2012 dropped the limits"
+                "needs shock.failure.board_strain.limit; IPC/JEDEC-9704 is left out, because its formula was not found"
+                " in two public texts and its revision A of 2012 dropped the limits"
             )
             return Judgement(self.name, value=value, unit="m/m", why=why)
         return Judgement(self.name, limit.source, value, limit.limit, "m/m")
