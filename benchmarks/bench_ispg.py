@@ -21,6 +21,7 @@ STEPS = 60
 
 
 def measure(count: int) -> dict[str, float]:
+    """Return the cost of a step of a cube with ``count`` particles per edge."""
     numerics = SolderNumerics(scheme="ispg", time_step_limit=20)
     angle = float(np.radians(60))
     solder = Solder(volume=1e-9, pad_contact_angle=angle, surface_tension=4.985, viscosity=0.227, numerics=numerics)

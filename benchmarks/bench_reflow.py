@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.support import results
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.neighbours import NeighbourList
-from reflowshock.particles.gripc.moving_least_squares import SUPPORT, derivatives
+from reflowshock.particles.gripc.moving_least_squares import SUPPORT, fit_derivatives
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
 from reflowshock.particles.scenes.reflow import solve_joint
 from reflowshock.particles.steps.rest import NotAtRest
@@ -33,7 +33,7 @@ COLUMNS = (
 )
 
 
-def joint(gap: float, numerics: SolderNumerics) -> dict:
+def run_joint(gap: float, numerics: SolderNumerics) -> dict:
     """Solve one joint and return its figures, or the failure if it does not come to rest."""
     solder = Solder(volume=BALL, numerics=numerics)
     row = {"gap_mm": gap, "spacing_mm": numerics.spacing / MM, "time_step_limit": numerics.time_step_limit}
@@ -44,7 +44,7 @@ def joint(gap: float, numerics: SolderNumerics) -> dict:
     return row | {"verdict": shape.verdict} | {name: shape.metrics[name][0] for name in COLUMNS}
 
 
-def derivative_errors(basis: str, count: int) -> dict:
+def measure_derivatives(basis: str, count: int) -> dict:
     """Return relative errors of gradient and Laplacian of sin(2x) cos(y) exp(z) on a perturbed lattice, and cost."""
     axis, spacing = np.linspace(0.0, 1.0, count), 1.0 / (count - 1)
     points = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3)
@@ -53,7 +53,7 @@ def derivative_errors(basis: str, count: int) -> dict:
     neighbours = NeighbourList(SUPPORT[basis] * spacing, 0.0)
     neighbours.update(points)
     start = perf_counter()
-    operators = derivatives(points, inner, neighbours, basis)
+    operators = fit_derivatives(points, inner, neighbours, basis)
     microseconds = 1e6 * (perf_counter() - start) / len(inner)
     x, y, z = points.T
     field = np.sin(2 * x) * np.cos(y) * np.exp(z)
@@ -67,7 +67,7 @@ def derivative_errors(basis: str, count: int) -> dict:
     }
 
 
-def cost_of_a_step(rows: list[dict]) -> dict:
+def fit_step_cost(rows: list[dict]) -> dict:
     """Fit seconds per step = a + b n, the model of ``particles.parameters.estimate``."""
     rows = [row for row in rows if "seconds" in row]
     slope, constant = np.polyfit([row["particles"] for row in rows], [row["seconds"] / row["steps"] for row in rows], 1)
@@ -76,19 +76,19 @@ def cost_of_a_step(rows: list[dict]) -> dict:
 
 def main() -> None:
     """Run all series and store the results."""
-    joint(0.31, SolderNumerics(spacing=0.1 * MM))
+    run_joint(0.31, SolderNumerics(spacing=0.1 * MM))
     for basis in SUPPORT:
-        derivative_errors(basis, 8)
-    by_spacing = [joint(0.31, SolderNumerics(spacing=spacing * MM)) for spacing in SPACINGS]
-    steps = [joint(0.31, SolderNumerics(time_step_limit=limit)) for limit in TIME_STEP_LIMITS]
-    gaps = [joint(gap, SolderNumerics()) for gap in GAPS]
+        measure_derivatives(basis, 8)
+    by_spacing = [run_joint(0.31, SolderNumerics(spacing=spacing * MM)) for spacing in SPACINGS]
+    steps = [run_joint(0.31, SolderNumerics(time_step_limit=limit)) for limit in TIME_STEP_LIMITS]
+    gaps = [run_joint(gap, SolderNumerics()) for gap in GAPS]
     result = {
         "spacing": by_spacing,
         "time_step": steps,
         "gaps": gaps,
         "seconds_of_all_gaps": sum(row["seconds"] for row in gaps),
-        "derivatives": [derivative_errors(basis, count) for basis in SUPPORT for count in PER_EDGE],
-        "cost_of_a_step": cost_of_a_step(by_spacing),
+        "derivatives": [measure_derivatives(basis, count) for basis in SUPPORT for count in PER_EDGE],
+        "cost_of_a_step": fit_step_cost(by_spacing),
     }
     results.write_figures(NAME, result)
     for name in ("spacing", "time_step", "gaps", "derivatives"):

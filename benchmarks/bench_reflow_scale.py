@@ -25,20 +25,23 @@ PER_EDGE = (11, 13, 17, 27, 41)
 STEPS = 8
 
 
-def cube(count: int) -> LiquidFlow:
+def make_cube(count: int) -> LiquidFlow:
+    """Return the flow of a cube of solder with ``count`` particles per edge that wets a wall."""
     numerics = SolderNumerics(time_step_limit=100)
     solder = Solder(volume=1e-9, pad_contact_angle=np.radians(60), numerics=numerics)
     cloud = box_cloud(1e-3, count)
     return start_flow(cloud, solder, EFFECTS, (contact_line(cloud, 0, np.inf, solder),))
 
 
-def largest_size() -> float:
+def peak_memory() -> float:
+    """Return the maximum resident size of this process so far [bytes]."""
     return 1024.0 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 def measure(count: int) -> dict:
-    cube(7).step()
-    before, flow = largest_size(), cube(count)
+    """Return the cost and the memory of a step of a cube with ``count`` particles per edge."""
+    make_cube(7).step()
+    before, flow = peak_memory(), make_cube(count)
     records = [flow.step()]
     start = perf_counter()
     records += [flow.step() for _ in range(STEPS)]
@@ -50,7 +53,7 @@ def measure(count: int) -> dict:
         "seconds_a_step": seconds,
         "particle_steps_per_second": particles / seconds,
         "iterations": max(record.iterations for record in records),
-        "bytes_a_particle": (largest_size() - before) / particles,
+        "bytes_a_particle": (peak_memory() - before) / particles,
     }
 
 

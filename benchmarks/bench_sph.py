@@ -32,13 +32,13 @@ ACROSS = 38
 SIZES, SHARED = {ACROSS: 200, 60: 200, 124: 100, 197: 50}, 60
 
 
-def dam_break() -> Simulation:
+def make_dam_break() -> Simulation:
     """Return a plane dam break of 20 000 particles of water."""
     numerics = SphNumerics(particles_across=100)
     return dam(DamBreak(height=0.6, width=1.2, tank_length=3.22, sensor_height=0.12, duration=1.0, numerics=numerics))
 
 
-def ink(tension: str, across: int, device: str = "cpu") -> Droplet:
+def make_ink_scene(tension: str, across: int, device: str = "cpu") -> Droplet:
     """Return a drop of ink that strikes a wall, with or without surface tension."""
     effects = DropletEffects(surface_tension=tension, viscosity="on")
     liquid = {"density": 1000.0, "surface_tension": 0.072, "viscosity": 0.0149, "contact_angle": 1.57, "speed": 5.0}
@@ -46,30 +46,30 @@ def ink(tension: str, across: int, device: str = "cpu") -> Droplet:
     return Droplet(diameter=23e-6, duration=1e-5, **liquid, effects=effects, numerics=numerics)
 
 
-def drop() -> Simulation:
+def make_drop() -> Simulation:
     """Return a drop of 28 000 particles with a tracked surface."""
-    return droplet(ink("on", ACROSS))
+    return droplet(make_ink_scene("on", ACROSS))
 
 
-def stretched_drop(across: int, device: Callable[..., Any]) -> Simulation:
+def make_stretched_drop(across: int, device: Callable[..., Any]) -> Simulation:
     """Return a free drop without a tracked surface or particle shifting, stretched along z.
 
     Its viscosity is a tenth of that of ink, so that the speed of sound limits the time step of all sizes.
     """
-    scene = ink("off", across)
+    scene = make_ink_scene("off", across)
     coordinates = (np.arange(-(across // 2) - 1, across // 2 + 1) + 0.5) * scene.spacing
     lattice = np.stack(np.meshgrid(coordinates, coordinates, coordinates, indexing="ij")).reshape(3, -1)
     points = lattice[:, (lattice**2).sum(axis=0) < (0.5 * scene.diameter) ** 2]
     law = liquid_of(scene, scene.spacing)[0]._replace(
         tracked=0, shifting=0.0, mirror=0, viscosity=0.1 * scene.viscosity
     )
-    fields = flow.liquid_and_walls(points, np.empty((3, 0)), np.zeros(points.shape[1]), law)
+    fields = flow.make_fields(points, np.empty((3, 0)), np.zeros(points.shape[1]), law)
     for speed, share, coordinate in zip(fields[3:6], (-0.5, -0.5, 1.0), points, strict=True):
         speed[:] = share * scene.impact_speed * coordinate / (0.5 * scene.diameter)
     return Simulation(fields, points.shape[1], law, device=device)
 
 
-def go_on(simulation: Simulation, steps: int) -> float:
+def time_steps(simulation: Simulation, steps: int) -> float:
     """Take steps and return their wall time [s], GPU work included."""
     start = perf_counter()
     for _ in range(steps):
@@ -78,18 +78,18 @@ def go_on(simulation: Simulation, steps: int) -> float:
     return perf_counter() - start
 
 
-def seconds(simulation: Simulation, threads: int) -> tuple[float, float]:
+def time_on_threads(simulation: Simulation, threads: int) -> tuple[float, float]:
     """Return wall and processor time [s] of ``STEPS`` steps on a number of threads."""
     set_num_threads(threads)
     processor = process_time()
-    return go_on(simulation, STEPS), process_time() - processor
+    return time_steps(simulation, STEPS), process_time() - processor
 
 
 def measure(simulation: Simulation) -> dict[str, float]:
     """Return the rate of one thread (processor time) and the speed-up of two (wall time), each from the best turn."""
     most = get_num_threads()
-    seconds(simulation, most)
-    turns = [(seconds(simulation, 1), seconds(simulation, min(2, most))) for _ in range(TURNS)]
+    time_on_threads(simulation, most)
+    turns = [(time_on_threads(simulation, 1), time_on_threads(simulation, min(2, most))) for _ in range(TURNS)]
     set_num_threads(most)
     single_seconds = min(processor for (_, processor), _ in turns)
     speedup = min(single[0] for single, _ in turns) / min(double[0] for _, double in turns)
@@ -110,10 +110,10 @@ def measure_gpu() -> dict[str, Any] | None:
     figures: dict[str, Any] = {"card": str(cuda.get_current_device().name), "sizes": {}}
     for across, steps in SIZES.items():
         free = cuda.current_context().get_memory_info()[0]
-        simulation = stretched_drop(across, CudaParticles)
-        go_on(simulation, 5)
+        simulation = make_stretched_drop(across, CudaParticles)
+        time_steps(simulation, 5)
         lists = simulation.particles.builds
-        rate = simulation.fluids * steps / go_on(simulation, steps)
+        rate = simulation.fluids * steps / time_steps(simulation, steps)
         lists = simulation.particles.builds - lists
         used = (free - cuda.current_context().get_memory_info()[0]) / simulation.fluids
         figures["sizes"][simulation.fluids] = {
@@ -122,17 +122,21 @@ def measure_gpu() -> dict[str, Any] | None:
         if across == SHARED:
             figures["gpu"] = rate
         del simulation
-    shared, most = stretched_drop(SHARED, ThreadParticles), get_num_threads()
-    go_on(shared, 5)
+    shared, most = make_stretched_drop(SHARED, ThreadParticles), get_num_threads()
+    time_steps(shared, 5)
     for threads in (most, 2, 1):
         set_num_threads(threads)
-        figures[f"threads_{threads}"] = max(shared.fluids * 10 / go_on(shared, 10) for _ in range(3))
+        figures[f"threads_{threads}"] = max(shared.fluids * 10 / time_steps(shared, 10) for _ in range(3))
     set_num_threads(most)
     return figures
 
 
 def main() -> None:
-    scenes = {"dam_break": dam_break(), "free_drop": stretched_drop(ACROSS, ThreadParticles), "drop": drop()}
+    scenes = {
+        "dam_break": make_dam_break(),
+        "free_drop": make_stretched_drop(ACROSS, ThreadParticles),
+        "drop": make_drop(),
+    }
     rows: dict[str, Any] = {name: measure(scene) for name, scene in scenes.items()}
     figures = {
         "particle_steps_per_second": (rows["free_drop"]["particle_steps_per_second"], RATE),

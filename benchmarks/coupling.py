@@ -36,7 +36,7 @@ EQUAL, OVERHEAD, BUSY = 1e-8, 0.03, 0.9
 SOURCES = ("coupling_stability", "two_scale", "two_scale_peers")
 
 
-def equality(scene: DropScene, scheme: str, folder: Path) -> dict[str, float]:
+def compare_placements(scene: DropScene, scheme: str, folder: Path) -> dict[str, float]:
     """Return the difference between the histories of each placement and those of one rank."""
     request = scene.request("two_scale", {"scheme": scheme}, SHOCK)
     reference, _ = launch(request, {"total": 1, "placement": "shared"}, folder / f"{scheme}_1")
@@ -51,7 +51,7 @@ def equality(scene: DropScene, scheme: str, folder: Path) -> dict[str, float]:
     return differences
 
 
-def balance(scene: DropScene, scheme: str, folder: Path) -> dict[str, Any]:
+def measure_load_balance(scene: DropScene, scheme: str, folder: Path) -> dict[str, Any]:
     """Return the load figures that the program reports for two ranks that share both models."""
     request = scene.request("two_scale", {"scheme": scheme}, SHOCK)
     _, result = launch(request, {"total": 2, "placement": "shared"}, folder / f"{scheme}_balance")
@@ -60,7 +60,7 @@ def balance(scene: DropScene, scheme: str, folder: Path) -> dict[str, Any]:
     }
 
 
-def own_bars(figures: dict[str, dict]) -> dict[str, dict]:
+def judge_ranks(figures: dict[str, dict]) -> dict[str, dict]:
     """Return the limits on ranks with their measured values."""
     bars = {f"equal histories: {name}": turns.bar(value, EQUAL, False) for name, value in figures["equality"].items()}
     for scheme, values in figures["balance"].items():
@@ -69,7 +69,7 @@ def own_bars(figures: dict[str, dict]) -> dict[str, dict]:
     return bars
 
 
-def table(bars: dict[str, dict[str, dict]]) -> str:
+def format_table(bars: dict[str, dict[str, dict]]) -> str:
     """Format the limits of all results as a Markdown table."""
     rows = [
         f"| {source} | {name} | {item['holds_if']} {item['limit']:.3g} | {item['value']:.3g} |"
@@ -80,7 +80,7 @@ def table(bars: dict[str, dict[str, dict]]) -> str:
     return "\n".join(["| benchmark | quantity | limit | measured | |", "|---|---|---|---|---|", *rows])
 
 
-def other_bars() -> dict[str, dict[str, dict]]:
+def read_other_bars() -> dict[str, dict[str, dict]]:
     """Return the limits in the results of the other benchmarks."""
     bars = {}
     for name in SOURCES:
@@ -99,12 +99,14 @@ def main() -> None:
             (folder / name).mkdir()
         small, reduced = DropScene.write(folder / "small", SMALL), DropScene.write(folder / "reduced", REDUCED)
         figures = {
-            "equality": {k: value for scheme in schemes for k, value in equality(small, scheme, folder).items()},
-            "balance": {scheme: balance(reduced, scheme, folder) for scheme in schemes[:2]},
+            "equality": {
+                k: value for scheme in schemes for k, value in compare_placements(small, scheme, folder).items()
+            },
+            "balance": {scheme: measure_load_balance(reduced, scheme, folder) for scheme in schemes[:2]},
         }
-    bars = own_bars(figures)
+    bars = judge_ranks(figures)
     results.write_and_print("coupling", figures | {"cores": len(os.sched_getaffinity(0)), "bars": bars})
-    print(table({"coupling": bars} | other_bars()))
+    print(format_table({"coupling": bars} | read_other_bars()))
 
 
 if __name__ == "__main__":

@@ -29,7 +29,7 @@ LARGEST_FRACTION = 0.95
 DRIFT, MOMENTUM = 1e-3, 1e-10
 
 
-def grid() -> Iterator[tuple[Pair, float]]:
+def sample_grid() -> Iterator[tuple[Pair, float]]:
     """Yield pairs and step fractions."""
     for substeps, impedance, ratio in product((1, 2, 3, 5, 8, 13, 24, 40), (0.1, 0.3, 1.0, 3.0, 10.0), RATIOS):
         yield Pair(substeps, impedance, ratio), 0.9
@@ -41,7 +41,7 @@ def grid() -> Iterator[tuple[Pair, float]]:
         yield Pair(substeps, impedance, 2.0, height=3, thinnest=thinnest), LARGEST_FRACTION
 
 
-def growths(pair: Pair, fraction: float) -> dict[str, float]:
+def measure_growths(pair: Pair, fraction: float) -> dict[str, float]:
     """Return the spectral radius minus 1 for every scheme."""
     finer = pair.substeps > 1  # otherwise local steps equal the window
     chosen = {name: coupling for name, coupling in SCHEMES.items() if finer or coupling.scheme != "local_steps"}
@@ -50,7 +50,7 @@ def growths(pair: Pair, fraction: float) -> dict[str, float]:
     return {name: coupled.spectral_radius() - 1.0 for name, coupled in made.items()}
 
 
-def table(rows: list[dict]) -> dict[str, dict]:
+def summarise_growths(rows: list[dict]) -> dict[str, dict]:
     """Return the number of unstable samples and the largest growth of every scheme."""
     result = {}
     for name in (*SCHEMES, PRINTED):
@@ -66,7 +66,7 @@ def table(rows: list[dict]) -> dict[str, dict]:
     return result
 
 
-def bars_of(result: dict) -> dict[str, dict]:
+def judge_growths(result: dict) -> dict[str, dict]:
     """Return the limits with their measured values."""
     schemes, momentum_errors = result["schemes"], result["momentum_error"]
     bars = {f"growth of a window, {name}": turns.bar(schemes[name]["worst"], GROWTH, False) for name in SCHEMES}
@@ -76,7 +76,7 @@ def bars_of(result: dict) -> dict[str, dict]:
     return bars | {f"momentum, {name}": turns.bar(value, MOMENTUM, False) for name, value in momentum_errors.items()}
 
 
-def long_runs(windows: int) -> dict[str, dict]:
+def run_long(windows: int) -> dict[str, dict]:
     """Return the energy drift and the largest interface energy after an undamped push."""
     result = {}
     for name in ("held_velocity", "impulse", "local_steps"):
@@ -93,16 +93,16 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="take every twentieth pair and 1e4 windows")
     quick = parser.parse_args().quick
     rows = []
-    for pair, fraction in list(grid())[:: 20 if quick else 1]:
-        rows.append({"pair": repr(pair), "fraction": fraction, "growth": growths(pair, fraction)})
+    for pair, fraction in list(sample_grid())[:: 20 if quick else 1]:
+        rows.append({"pair": repr(pair), "fraction": fraction, "growth": measure_growths(pair, fraction)})
         print(len(rows), rows[-1]["pair"], {name: f"{value:.1e}" for name, value in rows[-1]["growth"].items()})
     momentum = {name: momentum_error(coupling, 0.9) for name, coupling in SCHEMES.items()}
-    result = {"limit": GROWTH, "schemes": table(rows), "long_runs": long_runs(LONG // 10 if quick else LONG)}
+    result = {"limit": GROWTH, "schemes": summarise_growths(rows), "long_runs": run_long(LONG // 10 if quick else LONG)}
     result |= {"momentum_error": momentum}
     for name, line in result["schemes"].items():
         print(f"{name:28s} {line['unstable']:4d} of {line['samples']} grow, worst {line['worst']:.1e} a window")
     print(json.dumps({name: result[name] for name in ("long_runs", "momentum_error")}, indent=1))
-    results.write_and_print("coupling_stability", result | {"bars": bars_of(result)})
+    results.write_and_print("coupling_stability", result | {"bars": judge_growths(result)})
 
 
 if __name__ == "__main__":

@@ -84,9 +84,9 @@ IN_HEIGHT, FOLLOWED = (40, 60), 0.47
 MEASURED = ((1.212, 1.443), (1.219, 1.474), (1.602, 1.884), (1.997, 2.292))
 
 
-def impact() -> dict:
+def run_impacts() -> dict:
     """Run every impact with both codes and draw their widths over time."""
-    spreads = {name: one_impact(impact_scene) for name, impact_scene in IMPACTS.items()}
+    spreads = {name: run_impact(impact_scene) for name, impact_scene in IMPACTS.items()}
     draw(spreads)
     return spreads
 
@@ -108,13 +108,13 @@ def draw(spreads: dict) -> None:
     figure.savefig(results.path_of(NAME).with_suffix(".png"), dpi=100)
 
 
-def one_impact(impact_scene: Impact) -> dict:
+def run_impact(impact_scene: Impact) -> dict:
     """Return the width over time [D / U] and the maximum width [D] of both codes."""
-    scene = struck(impact_scene, ANGLES[0])
+    scene = make_impact_scene(impact_scene, ANGLES[0])
     return {"delta_sph": impact_by_particles(scene), "interfoam": impact_by_interfoam(scene, CELLS)}
 
 
-def struck(impact_scene: Impact, advancing: float) -> Droplet:
+def make_impact_scene(impact_scene: Impact, advancing: float) -> Droplet:
     """Return the scene of an impact with an advancing contact angle [degrees]."""
     numerics = DropletNumerics(particles_per_diameter=impact_scene.across)
     angles = {"contact_angle": np.radians(ANGLES[0]), "advancing_angle": np.radians(advancing)}
@@ -132,10 +132,10 @@ def impact_by_particles(scene: Droplet) -> dict:
     except SurfaceLost as error:
         return {"particles": scene.particles, "seconds": process_time() - start, "broke": str(error)}
     time, spread = history["time"] / scene.unit_of_time, history["spread"]
-    return {"particles": scene.particles} | row(time, spread, process_time() - start)
+    return {"particles": scene.particles} | summarise_width(time, spread, process_time() - start)
 
 
-def row(time: np.ndarray, spread: np.ndarray, seconds: float) -> dict:
+def summarise_width(time: np.ndarray, spread: np.ndarray, seconds: float) -> dict:
     """Return the figures of a width over time."""
     widest = int(np.argmax(spread))
     figures = {"time": np.round(time, 4).tolist(), "spread": np.round(spread, 4).tolist()}
@@ -165,16 +165,16 @@ def impact_by_interfoam(scene: Droplet, cells: int) -> dict | None:
         f"fieldValues ( volScalarFieldValue alpha.solder 1 volVectorFieldValue U (0 0 {-scene.impact_speed}) ); }}"
     )
     with tempfile.TemporaryDirectory() as name:
-        log = interfoam.run(Path(name), wedge, parameters, start)
-        states = list(interfoam.states(Path(name), log, wedge))
+        log = interfoam.run_case(Path(name), wedge, parameters, start)
+        states = list(interfoam.read_states(Path(name), log, wedge))
     time = np.array([state.time for state in states]) / scene.unit_of_time
-    spread = np.array([2.0 * reach(state.alpha, wedge) for state in states]) / scene.diameter
-    return {"version": interfoam.version(log), "cells": wedge.rows * wedge.columns} | row(
+    spread = np.array([2.0 * measure_reach(state.alpha, wedge) for state in states]) / scene.diameter
+    return {"version": interfoam.read_version(log), "cells": wedge.rows * wedge.columns} | summarise_width(
         time, spread, states[-1].seconds
     )
 
 
-def reach(alpha: np.ndarray, wedge: Wedge) -> float:
+def measure_reach(alpha: np.ndarray, wedge: Wedge) -> float:
     """Return the largest radius [m] of half-full cells, interpolated linearly between cells."""
     middles, largest = 0.5 * (wedge.edges[1:] + wedge.edges[:-1]), 0.0
     for fractions in alpha:
@@ -187,19 +187,19 @@ def reach(alpha: np.ndarray, wedge: Wedge) -> float:
     return largest
 
 
-def widths() -> dict:
+def run_widths() -> dict:
     """Return the maximum widths of the fastest impacts by cells, contact angle and correlation."""
-    largest_widths = {name: widths_of(IMPACTS[name]) for name in FAST}
+    largest_widths = {name: compare_widths(IMPACTS[name]) for name in FAST}
     draw_widths(largest_widths)
     return largest_widths
 
 
-def widths_of(impact_scene: Impact) -> dict:
+def compare_widths(impact_scene: Impact) -> dict:
     """Return the maximum widths of one impact by both codes and by correlations."""
     numbers, static = impact_scene[1:3], ANGLES[0]
     largest_widths: dict = {correlation.__name__: correlation(*numbers) for correlation in (roisman, laan)}
     for angle in ANGLES:
-        scene, fineness = struck(impact_scene, angle), FINENESS if angle == static else (CELLS,)
+        scene, fineness = make_impact_scene(impact_scene, angle), FINENESS if angle == static else (CELLS,)
         largest_widths[f"{angle:.0f} degrees"] = {
             "delta_sph": impact_by_particles(scene),
             "interfoam": {cells: impact_by_interfoam(scene, cells) for cells in fineness},
@@ -236,15 +236,16 @@ def draw_widths(largest_widths: dict) -> None:
     figure.savefig(results.path_of("droplet_widths").with_suffix(".png"), dpi=100)
 
 
-def dam_break() -> dict:
+def run_dam_breaks() -> dict:
     """Return the front of the dam break by both codes for each resolution."""
     there = install()
     return {
-        str(count): {"delta_sph": dam(count)} | ({"pysph": dam_by_pysph(count)} if there else {}) for count in IN_HEIGHT
+        str(count): {"delta_sph": run_dam_break(count)} | ({"pysph": run_pysph_dam_break(count)} if there else {})
+        for count in IN_HEIGHT
     }
 
 
-def dam(count: int) -> dict:
+def run_dam_break(count: int) -> dict:
     """Return the dam break by this program with ``count`` particles over the height."""
     scene = DamBreak(
         height=HEIGHT, width=WIDTH, tank_length=TANK, sensor_height=0.4, duration=FOLLOWED, density=1000.0,
@@ -255,10 +256,10 @@ def dam(count: int) -> dict:
     seconds, steps = process_time() - start, int(result.metrics["steps"][0])
     front = front_errors(result.history["time"], result.history["front"] + 0.5 * scene.spacing)
     spent = {"particles": scene.particles, "steps": steps, "seconds": seconds}
-    return spent | rate(scene.particles, steps, seconds) | front
+    return spent | steps_per_second(scene.particles, steps, seconds) | front
 
 
-def dam_by_pysph(count: int) -> dict:
+def run_pysph_dam_break(count: int) -> dict:
     """Return the dam break by PySPH, whose particles also start half a spacing from the wall."""
     spacing = HEIGHT / count
     with tempfile.TemporaryDirectory() as name:
@@ -270,7 +271,7 @@ def dam_by_pysph(count: int) -> dict:
     figures = json.loads(next(line for line in done.stdout.splitlines() if line.startswith("@"))[1:])
     position = np.array(figures.pop("front"))
     front = front_errors(np.array(figures.pop("time")), position + WIDTH - position[0])
-    return figures | rate(figures["particles"], figures["steps"], figures["seconds"]) | front
+    return figures | steps_per_second(figures["particles"], figures["steps"], figures["seconds"]) | front
 
 
 def front_errors(time: np.ndarray, front: np.ndarray) -> dict:
@@ -284,7 +285,7 @@ def front_errors(time: np.ndarray, front: np.ndarray) -> dict:
     }
 
 
-def rate(particles: int, steps: int, seconds: float) -> dict:
+def steps_per_second(particles: int, steps: int, seconds: float) -> dict:
     """Return the particle-steps of the liquid per second of one core."""
     return {"particle_steps_per_second": particles * steps / seconds}
 
@@ -310,4 +311,6 @@ def install() -> bool:
 
 
 if __name__ == "__main__":
-    write_tables(__doc__.splitlines()[0], {"impact": impact, "widths": widths, "dam_break": dam_break}, NAME)
+    write_tables(
+        __doc__.splitlines()[0], {"impact": run_impacts, "widths": run_widths, "dam_break": run_dam_breaks}, NAME
+    )

@@ -27,7 +27,7 @@ CELLS, PER_EDGE, STRETCH = (40, 20, 4), 11, 2.0e-3
 PULSE = BodyAcceleration(DOWN, HalfSine(1.5e4, 5e-4))
 WEIGHT = BodyAcceleration(DOWN, Constant(STANDARD_GRAVITY))
 DROP = Solder(volume=1e-9, pad_contact_angle=np.radians(120.0))
-RESTING = {"gravity": True, "surface_tension": True, "wall_adhesion": True, "inertia": False, "viscosity": False}
+RESTING = {"gravity": True, "surface_tension": True, "wall_adhesion": True}
 RATELESS = SAC305.model_copy(update={"plasticity": SAC305.plasticity.model_copy(update={"C": 0.0})})
 BOARD = dns_body(
     mesh_of(
@@ -51,13 +51,13 @@ PAIRS = {
 }
 
 
-def reflow(**changes: bool) -> Callable[[], object]:
+def reflow_step(**changes: bool) -> Callable[[], object]:
     """Return the step function of a cube of solder that keeps flowing on a wall."""
     cloud = box_cloud(DROP.volume ** (1.0 / 3.0), PER_EDGE)
     return start_flow(cloud, DROP, RESTING | changes, (contact_line(cloud, 0, np.inf, DROP),)).step
 
 
-def drop(*loads: Load) -> Callable[[], object]:
+def drop_step(*loads: Load) -> Callable[[], object]:
     """Return the explicit step function of a board under loads."""
     body, critical = BOARD
     motion = motion_of(body, 0.5 * critical, loads)
@@ -69,7 +69,7 @@ def drop(*loads: Load) -> Callable[[], object]:
     return step
 
 
-def force(material: Material, kinematics: Kinematics = "small", stretch: float = 0.0) -> Callable[[], object]:
+def force_step(material: Material, kinematics: Kinematics = "small", stretch: float = 0.0) -> Callable[[], object]:
     """Return the force evaluation of a step of elements under increasing stretch."""
     body, _ = BOARD
     terms = force_terms(body.elements, [material], kinematics, 1e-8)
@@ -86,24 +86,24 @@ def force(material: Material, kinematics: Kinematics = "small", stretch: float =
     return work
 
 
-def sides() -> dict[str, Callable[[], object]]:
+def make_sides() -> dict[str, Callable[[], object]]:
     """Return the step function of each side."""
     body = BOARD[0]
-    reflows = {PAIRS[name][2 - acts]: reflow(**{name: acts}) for name in LIQUID for acts in (True, False)}
+    reflows = {PAIRS[name][2 - acts]: reflow_step(**{name: acts}) for name in LIQUID for acts in (True, False)}
     return reflows | {
-        "drop": drop(PULSE),
-        "drop_weight": drop(PULSE, WEIGHT),
-        "drop_alpha": drop(PULSE, RayleighDamping.build(body, 1.0, 0.0)),
-        "drop_beta": drop(PULSE, RayleighDamping.build(body, 0.0, 1e-10)),
-        "force": force(FR4),
-        "force_finite": force(FR4, "finite"),
-        "force_yielding": force(SAC305),
-        "flowing": force(SAC305, stretch=STRETCH),
-        "flowing_rateless": force(RATELESS, stretch=STRETCH),
+        "drop": drop_step(PULSE),
+        "drop_weight": drop_step(PULSE, WEIGHT),
+        "drop_alpha": drop_step(PULSE, RayleighDamping.build(body, 1.0, 0.0)),
+        "drop_beta": drop_step(PULSE, RayleighDamping.build(body, 0.0, 1e-10)),
+        "force": force_step(FR4),
+        "force_finite": force_step(FR4, "finite"),
+        "force_yielding": force_step(SAC305),
+        "flowing": force_step(SAC305, stretch=STRETCH),
+        "flowing_rateless": force_step(RATELESS, stretch=STRETCH),
     }
 
 
-def ratios(seconds: Mapping[str, np.ndarray]) -> dict[str, dict]:
+def compute_ratios(seconds: Mapping[str, np.ndarray]) -> dict[str, dict]:
     """Return effect -> processor seconds with it over those without it, the median over rounds."""
     return {
         name: {"ratio": float(np.median(seconds[acting] / seconds[left_out])), "of": what}
@@ -112,8 +112,8 @@ def ratios(seconds: Mapping[str, np.ndarray]) -> dict[str, dict]:
 
 
 def main() -> None:
-    seconds = turns.in_turns({name: turns.batch(work) for name, work in sides().items()})
-    cost_ratios = ratios(seconds)
+    seconds = turns.measure_in_turns({name: turns.make_batch(work) for name, work in make_sides().items()})
+    cost_ratios = compute_ratios(seconds)
     MEASURED.write_text(json.dumps({"source": "benchmarks/effects.py", "effects": cost_ratios}, indent=1) + "\n")
     medians = {name: float(np.median(s)) for name, s in seconds.items()}
     results.write_and_print("effects", {"effects": cost_ratios, "seconds": medians})

@@ -31,7 +31,7 @@ from reflowshock.fem.elements.element import critical_steps
 from reflowshock.fem.forces.force import Kinematics
 from reflowshock.fem.mesh.facet import area_vectors
 from reflowshock.fem.mesh.mesh import MeshData, boundary_facets
-from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, make_body, make_rank_elements
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.factorisation import Factorisation
 from reflowshock.fem.model.global_matrix import Equations
@@ -95,8 +95,12 @@ class Problem:
         mesh = MeshData(points, cells, np.zeros(len(cells), np.int32), ("board",), {})
         item = prepare(mesh, "dns")["dns"]
         formulation = self.kind if KINDS[self.kind].nodes == 8 else "incompatible_modes"
-        pieces = make_pieces(distribute(MPI.COMM_SELF, mesh), item.tables, {"board": material}, formulation)
-        body = make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)), ForceOptions(kinematics))
+        rank_elements = make_rank_elements(
+            distribute(MPI.COMM_SELF, mesh), item.tables, {"board": material}, formulation
+        )
+        body = make_body(
+            MPI.COMM_SELF, rank_elements, item.tables, np.ones(len(rank_elements.steps)), ForceOptions(kinematics)
+        )
         body.free[self.held(body.local.points)] = False
         return body
 
@@ -113,7 +117,7 @@ class Problem:
         return held
 
 
-def deflection(body: Body, equations: Equations) -> float:
+def solve_deflection(body: Body, equations: Equations) -> float:
     """Return the largest deflection [m] under a uniform pressure of 1 Pa on the top."""
     local = body.local
     facets = boundary_facets(local.cells)[:, CYCLIC if local.cells.shape[1] == 8 else slice(None)]
@@ -127,14 +131,14 @@ def deflection(body: Body, equations: Equations) -> float:
     return float(np.abs(displacement[:, 2]).max())
 
 
-def answers(body: Body) -> dict:
+def solve_problem(body: Body) -> dict:
     """Return the deflection [m] and the first natural frequency [Hz]."""
     equations = Equations.of(MPI.COMM_SELF, body)
     frequency = float(natural_modes(equations, 1).frequency[0])
-    return {"deflection": deflection(body, equations), "frequency": frequency}
+    return {"deflection": solve_deflection(body, equations), "frequency": frequency}
 
 
-def seconds_a_step(motion: ExplicitMotion | ImplicitMotion) -> float:
+def time_step_of(motion: ExplicitMotion | ImplicitMotion) -> float:
     """Return the processor seconds of a whole step, force included; best of three batches."""
 
     def batch(steps: int) -> float:
@@ -153,23 +157,23 @@ def explicit_motion(body: Body, step: float) -> ExplicitMotion:
     return ExplicitMotion(body, [], step, np.empty(0, np.int32), np.zeros(len(body.mass)))
 
 
-def speeds(cells: tuple[int, int]) -> dict:
+def measure_speeds(cells: tuple[int, int]) -> dict:
     """Return element updates per second of whole steps at small and finite strain for every kind of element."""
     updates = {}
     for kind in KINDS:
         bodies = {name: Problem("plate", 0.3, cells, kind).body(name) for name in KINEMATICS}
         updates[kind] = {
-            name: len(body.local.cells) / seconds_a_step(explicit_motion(body, 1e-9)) for name, body in bodies.items()
+            name: len(body.local.cells) / time_step_of(explicit_motion(body, 1e-9)) for name, body in bodies.items()
         }
     return updates
 
 
-def costs(body: Body, period: float) -> dict:
+def measure_costs(body: Body, period: float) -> dict:
     """Return the cost of one period [s] with either solver."""
     count = len(body.local.cells)
     critical = float(critical_steps(body.elements, body.geometry.nodal_volume).min())
     steps = int(np.ceil(period / (STEP_FRACTION * critical)))
-    explicit = seconds_a_step(explicit_motion(body, period / steps))
+    explicit = time_step_of(explicit_motion(body, period / steps))
     begin = process_time()
     implicit = ImplicitMotion(MPI.COMM_SELF, body, [], period / STEPS_PER_PERIOD)
     factor = process_time() - begin
@@ -181,7 +185,7 @@ def costs(body: Body, period: float) -> dict:
         "updates_per_second": count / explicit,
         "explicit_seconds": steps * explicit,
         "factor_seconds": factor,
-        "implicit_seconds": factor + STEPS_PER_PERIOD * seconds_a_step(implicit),
+        "implicit_seconds": factor + STEPS_PER_PERIOD * time_step_of(implicit),
     }
 
 
@@ -198,41 +202,43 @@ def mindlin_frequency(poisson: float) -> float:
 
 def measure(refinement: Refinement) -> Iterator[dict]:
     """Yield the rows of one refinement: every kind at every size against the finest hexahedra."""
-    exact = answers(Problem(refinement.problem, refinement.poisson, refinement.finest, "incompatible_modes").body())
+    exact = solve_problem(
+        Problem(refinement.problem, refinement.poisson, refinement.finest, "incompatible_modes").body()
+    )
     for kind in NAMES:
         for cells in refinement.cells:
             body = Problem(refinement.problem, refinement.poisson, cells, kind).body()
-            errors = {f"{name}_error": value / exact[name] - 1.0 for name, value in answers(body).items()}
+            errors = {f"{name}_error": value / exact[name] - 1.0 for name, value in solve_problem(body).items()}
             row = {
                 "problem": refinement.problem,
                 "poisson_ratio": refinement.poisson,
                 "kind": kind,
                 "cells": list(cells),
             }
-            yield row | errors | costs(body, 1.0 / exact["frequency"])
+            yield row | errors | measure_costs(body, 1.0 / exact["frequency"])
 
 
-def reference_check(refinements: tuple[Refinement, ...]) -> dict:
+def check_reference(refinements: tuple[Refinement, ...]) -> dict:
     """Return the relative difference between the finest plate and Mindlin's frequency."""
     plate = next(refinement for refinement in refinements if refinement.problem == "plate")
-    frequency = answers(Problem("plate", plate.poisson, plate.finest, "incompatible_modes").body())["frequency"]
+    frequency = solve_problem(Problem("plate", plate.poisson, plate.finest, "incompatible_modes").body())["frequency"]
     return {"finest_plate_over_mindlin": frequency / mindlin_frequency(plate.poisson) - 1.0}
 
 
 def run_all(refinements: tuple[Refinement, ...]) -> dict:
     """Run the refinements and store the results after each row."""
     next(measure(Refinement("plate", 0.3, ((2, 1),), (3, 1))))  # compiles the kernels of all rows
-    speed = speeds(refinements[-1].cells[-1])
-    result = {"rows": [], "speeds": speed, **reference_check(refinements)}
+    speed = measure_speeds(refinements[-1].cells[-1])
+    result = {"rows": [], "speeds": speed, **check_reference(refinements)}
     for refinement in refinements:
         for row in measure(refinement):
             result["rows"].append(row)
             results.write_figures(NAME, result)
-            print(" | ".join(cells_of(row)), flush=True)
+            print(" | ".join(format_cells(row)), flush=True)
     return result
 
 
-def cells_of(row: dict) -> list[str]:
+def format_cells(row: dict) -> list[str]:
     """Format the cells of a row."""
     return [
         f"{row['problem']}, nu {row['poisson_ratio']:g}",
@@ -242,12 +248,12 @@ def cells_of(row: dict) -> list[str]:
         f"{1e9 * row['critical_step']:.0f} ns",
         f"{row['explicit_steps']}",
         f"{1e-6 * row['updates_per_second']:.1f} M/s",
-        seconds(row["explicit_seconds"]),
-        seconds(row["implicit_seconds"]),
+        format_seconds(row["explicit_seconds"]),
+        format_seconds(row["implicit_seconds"]),
     ]
 
 
-def seconds(value: float) -> str:
+def format_seconds(value: float) -> str:
     """Format seconds with two digits and without exponent."""
     return f"{value:.0f} s" if value >= 10 else f"{value:.2g} s"
 

@@ -45,17 +45,17 @@ RESULTANTS = {"axial_force": [0], "shear_force": [1, 2], "torsion": [3], "bendin
 Measures = dict[str, float]
 
 
-def scene_at(size: float, folder: Path) -> DropScene:
+def mesh_scene(size: float, folder: Path) -> DropScene:
     """Mesh the scene with element sizes multiplied by ``size``."""
     run = board_drop_study(read_case(CASES / NAME / "case.toml", SCENE)).parameters[0].run_at(size)
     sized = (f"{key}={value}" for key, value in run.settings.items() if key.startswith(("board.", "package.")))
     return DropScene.write(folder, (*SCENE, *sized), NAME)
 
 
-def measured(size: float) -> dict:
+def measure_drop(size: float) -> dict:
     """Run the drop on a mesh; return the peaks of the fine joint's measures as ``<measure>@<end>``."""
     with tempfile.TemporaryDirectory() as folder:
-        scene, coupling = scene_at(size, Path(folder)), {"fine_joints": [JOINT]}
+        scene, coupling = mesh_scene(size, Path(folder)), {"fine_joints": [JOINT]}
         first, *others = (scene.request("two_scale", coupling, SHOCK | {"joint_layer": layer}) for layer in LAYERS)
         run = ProgramRun(first, others)
     arrays, seconds = run.to_end()
@@ -79,7 +79,7 @@ def measured(size: float) -> dict:
     }
 
 
-def changes(coarse: Measures, fine: Measures) -> Measures:
+def relative_changes(coarse: Measures, fine: Measures) -> Measures:
     """Return the relative differences between two meshes; resultants over the section force (times radius)."""
     scale = {}
     for end in ENDS:
@@ -96,12 +96,12 @@ def main() -> None:
     chosen = parser.parse_args().sizes or SIZES
     figures = results.read_figures(RESULTS) or {"meshes": {}}
     for size in chosen:
-        figures["meshes"][f"{size:g}"] = measured(size)
+        figures["meshes"][f"{size:g}"] = measure_drop(size)
         print(f"{size:g}", json.dumps(figures["meshes"][f"{size:g}"]), flush=True)
         sizes = sorted(map(float, figures["meshes"]), reverse=True)
         values = [figures["meshes"][f"{size:g}"]["values"] for size in sizes]
         figures["changes"] = {
-            f"{size:g}": changes(value, values[-1]) for size, value in zip(sizes, values, strict=True)
+            f"{size:g}": relative_changes(value, values[-1]) for size, value in zip(sizes, values, strict=True)
         }
         limits = {key: richardson(sizes[-3:], [value[key] for value in values[-3:]], None) for key in values[0]}
         figures["orders"] = {key: limit[1] for key, limit in limits.items() if limit}

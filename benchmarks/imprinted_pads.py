@@ -29,7 +29,7 @@ PRINTED = ("axial_force", "shear_force", "bending_moment", "von_mises:25um", "pl
 Measures = dict[str, float]
 
 
-def solved(mesh: Mesh, yields: bool, angle: float | None = None) -> Measures:
+def solve_patch(mesh: Mesh, yields: bool, angle: float | None = None) -> Measures:
     """Return the measures of both ends as ``<measure>@<end>``."""
     whole, _ = patch(mesh)
     if angle is None and mesh.joint["core"] % 2 == 0 and not mesh.shift and mesh.swept:  # y = 0 is a line of the mesh
@@ -39,7 +39,7 @@ def solved(mesh: Mesh, yields: bool, angle: float | None = None) -> Measures:
     return {f"{name}@{end}": value for end, values in measures for name, value in values.items()}
 
 
-def described(mesh: Mesh) -> dict:
+def describe_mesh(mesh: Mesh) -> dict:
     """Return sizes, quality and critical steps of a mesh."""
     whole, joint = patch(mesh)
     data, elements = whole.mesh, Problem(whole, False).elements
@@ -54,15 +54,15 @@ def described(mesh: Mesh) -> dict:
     }
 
 
-def meshes() -> dict:
+def compare_meshes() -> dict:
     """Return the properties and measures of each mesh."""
     return {
-        name: described(mesh) | {"elastic": solved(mesh, False), "yielding": solved(mesh, True)}
+        name: describe_mesh(mesh) | {"elastic": solve_patch(mesh, False), "yielding": solve_patch(mesh, True)}
         for name, mesh in MESHES.items()
     }
 
 
-def halved() -> dict:
+def compare_sizes() -> dict:
     """Return the measures on three meshes, their differences and their Richardson limits.
 
     Moments are relative to the section force times the pad radius.
@@ -84,9 +84,9 @@ def halved() -> dict:
     return result
 
 
-def turned() -> dict:
+def compare_rotations() -> dict:
     """Return the measures under rotated motions and their differences to the motion along x."""
-    rows = {f"{angle:g}": solved(IMPRINTED, False, radians(angle)) for angle in ANGLES}
+    rows = {f"{angle:g}": solve_patch(IMPRINTED, False, radians(angle)) for angle in ANGLES}
     first = next(iter(rows.values()))
     changes = {angle: _changes(row, first) for angle, row in rows.items()}
     for angle, differences in changes.items():
@@ -99,7 +99,7 @@ def turned() -> dict:
 
 def _timed(size: float, yields: bool) -> dict:
     begin = process_time()
-    values = solved(IMPRINTED.times(size), yields)
+    values = solve_patch(IMPRINTED.times(size), yields)
     return {"seconds": process_time() - begin, "values": values}
 
 
@@ -111,7 +111,7 @@ def _changes(coarse: Measures, fine: Measures) -> Measures:
     return {key: (coarse[key] - value) / over[key] for key, value in fine.items() if over[key]}
 
 
-TABLES = {"meshes": meshes, "halved": halved, "turned": turned}
+TABLES = {"meshes": compare_meshes, "halved": compare_sizes, "turned": compare_rotations}
 
 
 if __name__ == "__main__":

@@ -51,7 +51,7 @@ class Sample:
     capillary_number: float
 
 
-def parameters(solder: Solder) -> dict[str, float | str]:
+def case_parameters(solder: Solder) -> dict[str, float | str]:
     """Return the parameters that the OpenFOAM case includes."""
     return {
         "contactAngle": ANGLE,
@@ -66,17 +66,17 @@ def parameters(solder: Solder) -> dict[str, float | str]:
     }
 
 
-def samples(states: Iterable[State], solder: Solder) -> list[Sample]:
+def measure_samples(states: Iterable[State], solder: Solder) -> list[Sample]:
     """Return the drop at each written time."""
     drop_samples = []
     for state in states:
         fastest = float(state.speed[state.alpha > 0.9].max())
         number = solder.viscosity * fastest / solder.surface_tension
-        drop_samples.append(Sample(state.time, state.seconds, *extent(state.alpha), number))
+        drop_samples.append(Sample(state.time, state.seconds, *measure_extent(state.alpha), number))
     return drop_samples
 
 
-def extent(alpha: np.ndarray) -> tuple[float, float, float]:
+def measure_extent(alpha: np.ndarray) -> tuple[float, float, float]:
     """Return height [m], width at the wall [m] and volume [m^3] from volume fractions, shape (rows, columns).
 
     The width at the wall is extrapolated from the radii of the two lowest rows.
@@ -86,7 +86,7 @@ def extent(alpha: np.ndarray) -> tuple[float, float, float]:
     return WEDGE.cell * float(alpha[:, 0].sum()), 2.0 * float(1.5 * radius[0] - 0.5 * radius[1]), volume
 
 
-def settled(drop_samples: list[Sample]) -> tuple[Sample | None, list[Sample]]:
+def find_rest(drop_samples: list[Sample]) -> tuple[Sample | None, list[Sample]]:
     """Return the last third of the samples, and the first sample after which lengths stay near its means."""
     third = drop_samples[-len(drop_samples) // 3 :]
     means = {name: np.mean([getattr(sample, name) for sample in third]) for name in ("height", "width")}
@@ -99,30 +99,30 @@ def settled(drop_samples: list[Sample]) -> tuple[Sample | None, list[Sample]]:
     return (drop_samples[first] if first < len(drop_samples) - len(third) else None), third
 
 
-def by_interfoam(solder: Solder, exact: Meridian) -> dict:
+def run_interfoam(solder: Solder, exact: Meridian) -> dict:
     """Return time to rest and errors of interFoam."""
     with tempfile.TemporaryDirectory() as name:
-        log = interfoam.run(Path(name), WEDGE, parameters(solder), START)
-        drop_samples = samples(interfoam.states(Path(name), log, WEDGE), solder)
-    rest, third = settled(drop_samples)
+        log = interfoam.run_case(Path(name), WEDGE, case_parameters(solder), START)
+        drop_samples = measure_samples(interfoam.read_states(Path(name), log, WEDGE), solder)
+    rest, third = find_rest(drop_samples)
     volume, height, width, number = np.mean(
         [(sample.volume, sample.height, sample.width, sample.capillary_number) for sample in third], axis=0
     )
     scale = np.cbrt(VOLUME / volume)
     return {
-        "version": interfoam.version(log),
+        "version": interfoam.read_version(log),
         "cells": WEDGE.rows * WEDGE.columns,
         "seconds": drop_samples[-1].seconds,
         "physical_time_to_rest": rest and rest.time,
         "seconds_to_rest": rest and rest.seconds,
         "height_swing": float(np.ptp([sample.height for sample in third]) / height / 2.0),
         "volume_error": volume / VOLUME - 1.0,
-    } | errors(scale * height, scale * width, exact, number)
+    } | relative_errors(scale * height, scale * width, exact, number)
 
 
-def by_particles(exact: Meridian) -> dict:
+def run_particles(exact: Meridian) -> dict:
     """Return time to rest and errors of this program, computed without inertia."""
-    solder = molten(SolderNumerics(time_step_limit=100.0))
+    solder = molten_solder(SolderNumerics(time_step_limit=100.0))
     coarse, drop = (
         Drop(volume=VOLUME, contact_angle=solder.pad_contact_angle, particles_per_edge=count) for count in (5, PER_EDGE)
     )
@@ -135,10 +135,10 @@ def by_particles(exact: Meridian) -> dict:
         "particles": len(flow.body.points),
         "steps": len(run.records),
         "seconds_to_rest": process_time() - start,
-    } | errors(profile.drop_height(walls=1), profile.max_width, exact, number)
+    } | relative_errors(profile.drop_height(walls=1), profile.max_width, exact, number)
 
 
-def errors(height: float, width: float, exact: Meridian, capillary_number: float) -> dict:
+def relative_errors(height: float, width: float, exact: Meridian, capillary_number: float) -> dict:
     """Return signed relative errors and the remaining capillary number."""
     return {
         "height_error": height / exact.height - 1.0,
@@ -147,7 +147,7 @@ def errors(height: float, width: float, exact: Meridian, capillary_number: float
     }
 
 
-def molten(numerics: SolderNumerics | None = None) -> Solder:
+def molten_solder(numerics: SolderNumerics | None = None) -> Solder:
     """Return the solder of both codes."""
     return Solder(
         volume=VOLUME,
@@ -163,9 +163,9 @@ def main() -> None:
     if shutil.which("interFoam") is None:
         print("interFoam is not installed (Debian package openfoam): skipping the benchmark")
         return
-    solder = molten()
+    solder = molten_solder()
     exact = sessile_meridian(VOLUME, solder.pad_contact_angle, solder.surface_tension)
-    foam, particles = by_interfoam(solder, exact), by_particles(exact)
+    foam, particles = run_interfoam(solder, exact), run_particles(exact)
     spent = foam["seconds_to_rest"] or foam["seconds"]
     figures = {
         "interfoam": foam,

@@ -48,18 +48,19 @@ PAGE = os.sysconf("SC_PAGE_SIZE")
 
 
 def only_term(elements: Elements) -> ForceTerm:
+    """Return the single force term of a body of equal elements."""
     (term,) = force_terms(elements, [STEEL])
     return term
 
 
-def linear(elements: Elements) -> Callable[[], object]:
+def linear_force(elements: Elements) -> Callable[[], object]:
     """Return the force evaluation of linear elements."""
     term, displacement = only_term(elements), random_displacement(elements.points)
     force = np.zeros_like(displacement)
     return lambda: term.add(displacement, force)
 
 
-def turning(elements: Elements) -> Callable[[], object]:
+def corotational_force(elements: Elements) -> Callable[[], object]:
     """Return the force evaluation of elastic hexahedra with a strain of 1e-3 and a rotation of 0.1."""
     (term,) = force_terms(elements, [STEEL], "corotational")
     turn = np.array([[np.cos(0.1), -np.sin(0.1), 0.0], [np.sin(0.1), np.cos(0.1), 0.0], [0.0, 0.0, 1.0]])
@@ -68,7 +69,7 @@ def turning(elements: Elements) -> Callable[[], object]:
     return lambda: term.add(displacement, force)
 
 
-def plastic(elements: Elements, kinematics: Kinematics, strain: float) -> Callable[[], object]:
+def plastic_force(elements: Elements, kinematics: Kinematics, strain: float) -> Callable[[], object]:
     """Return the force evaluation of solder elements under increasing strain."""
     (term,) = force_terms(elements, [SOLDER], kinematics, STEP)
     state, growth = (random_displacement(elements.points, part) for part in (strain, STEP * RATE))
@@ -82,6 +83,7 @@ def plastic(elements: Elements, kinematics: Kinematics, strain: float) -> Callab
 
 
 def petsc_product(elements: Elements) -> Callable[[], object]:
+    """Return the product of PETSc's blocked stiffness matrix and a displacement, as a function to call."""
     count = len(elements.points)
     matrix = PETSc.Mat().createBAIJ((3 * count, 3 * count), bsize=3, comm=MPI.COMM_SELF)
     matrix.setPreallocationNNZ(27)
@@ -96,6 +98,7 @@ def petsc_product(elements: Elements) -> Callable[[], object]:
 
 
 def dolfinx_assembly(mesh: MeshData) -> Callable[[], object]:
+    """Return the assembly of the internal force by DOLFINx, as a function to call."""
     space = dolfinx_api.vector_space(dolfinx_api.make_mesh(MPI.COMM_SELF, mesh.points, mesh.cells))
     displacement, test = dolfinx.fem.Function(space), ufl.TestFunction(space)
     displacement.x.array[:] = np.random.default_rng(0).uniform(-1, 1, len(displacement.x.array))
@@ -110,7 +113,7 @@ def dolfinx_assembly(mesh: MeshData) -> Callable[[], object]:
     return lambda: dolfinx.fem.assemble_vector(vector, form)
 
 
-def resident() -> int:
+def resident_bytes() -> int:
     """Return the resident bytes of this process after returning free memory to the system."""
     gc.collect()
     ctypes.CDLL("libc.so.6").malloc_trim(0)
@@ -118,28 +121,29 @@ def resident() -> int:
 
 
 def array_bytes(term: ForceTerm) -> int:
+    """Return the bytes of all arrays of a force term."""
     return sum(value.nbytes for name in term.__slots__ if isinstance(value := getattr(term, name), np.ndarray))
 
 
-def memory(elements: Elements) -> dict[str, float]:
+def measure_memory(elements: Elements) -> dict[str, float]:
     """Return the bytes per element of a force term, counted over its arrays and as growth of the process."""
     warm = elements.subset(np.arange(64))
     only_term(warm)
-    before = resident()
+    before = resident_bytes()
     term = only_term(elements)
-    grown, count = resident() - before, len(elements.cells)
+    grown, count = resident_bytes() - before, len(elements.cells)
     return {"arrays": array_bytes(term) / count, "resident": grown / count}
 
 
 def model_bytes(mesh: MeshData) -> float:
     """Return the bytes per element of a whole model, including nodal vectors and the DOLFINx mesh."""
-    before = resident()
+    before = resident_bytes()
     model = motion_of(dns_body(mesh, STEEL)[0], STEP)
-    grown = resident() - before
+    grown = resident_bytes() - before
     return grown / len(model.body.elements.cells)
 
 
-def sides() -> tuple[dict[str, Callable[[], object]], dict[str, int]]:
+def make_sides() -> tuple[dict[str, Callable[[], object]], dict[str, int]]:
     """Return the force evaluations and their numbers of elements."""
     boxes, mesh = cube(), cube(distorted=True)
     linear_elements = {
@@ -149,13 +153,16 @@ def sides() -> tuple[dict[str, Callable[[], object]], dict[str, int]]:
         "quadratic_tetrahedra": elements_of(mesh, "tetrahedron_quadratic"),
     }
     plastic_elements = {kind: elements_of(boxes, kind, SOLDER) for kind in KINDS}
-    works = {name: linear(elements) for name, elements in linear_elements.items()}
-    works |= {"turning": turning(linear_elements["congruent"]), "turning_any": turning(linear_elements["assembled"])}
+    works = {name: linear_force(elements) for name, elements in linear_elements.items()}
+    works |= {
+        "turning": corotational_force(linear_elements["congruent"]),
+        "turning_any": corotational_force(linear_elements["assembled"]),
+    }
     counts = {name: len(elements.cells) for name, elements in linear_elements.items()}
     for kind, elements in plastic_elements.items():
         for kinematics in ("small", "finite"):
             for name, strain in STRAINS.items():
-                works[f"{name}_{kind}_{kinematics}"] = plastic(elements, kinematics, strain)
+                works[f"{name}_{kind}_{kinematics}"] = plastic_force(elements, kinematics, strain)
     works["petsc_baij"] = petsc_product(linear_elements["assembled"])
     works["petsc_baij_tetrahedra"] = petsc_product(linear_elements["tetrahedra"])
     works["dolfinx"] = dolfinx_assembly(mesh)
@@ -166,12 +173,12 @@ def sides() -> tuple[dict[str, Callable[[], object]], dict[str, int]]:
 def main() -> None:
     meshes = {"congruent": cube(), "assembled": cube(distorted=True)}
     motion_of(dns_body(cube(edge=4), STEEL)[0], STEP)  # compiles
-    memories = {name: memory(elements_of(mesh)) for name, mesh in meshes.items()}
+    memories = {name: measure_memory(elements_of(mesh)) for name, mesh in meshes.items()}
     models = {name: model_bytes(mesh) for name, mesh in meshes.items()}
-    works, counts = sides()
-    seconds = turns.in_turns({name: turns.batch(work) for name, work in works.items()})
+    works, counts = make_sides()
+    seconds = turns.measure_in_turns({name: turns.make_batch(work) for name, work in works.items()})
     hexahedra = [name for name in works if counts[name] == counts["dolfinx"]]
-    against = {name: turns.ratio(seconds, name, "dolfinx") for name in hexahedra}
+    against = {name: turns.speed_ratio(seconds, name, "dolfinx") for name in hexahedra}
     bars = {f"{name} / dolfinx": turns.bar(against[name], limit) for name, limit in BARS.items()}
     bars |= {
         f"{name} bytes an element": turns.bar(max(memories[name].values()), limit, at_least=False)
@@ -183,7 +190,7 @@ def main() -> None:
             "elements": counts,
             "updates_per_second": turns.rates(seconds, counts),
             "ratio_to_dolfinx": against,
-            "tetrahedra / petsc_baij": turns.ratio(seconds, "tetrahedra", "petsc_baij_tetrahedra"),
+            "tetrahedra / petsc_baij": turns.speed_ratio(seconds, "tetrahedra", "petsc_baij_tetrahedra"),
             "bytes_an_element": memories,
             "bytes_an_element_of_the_whole_model": models,
             "bars": bars,

@@ -204,7 +204,7 @@ COLUMNS = (
 )
 
 
-def judged(case: Molten) -> tuple[dict[str, tuple[float, str]], dict[str, dict]]:
+def compute_and_judge(case: Molten) -> tuple[dict[str, tuple[float, str]], dict[str, dict]]:
     """Compute a case; return its metrics under the program's names and its health checks."""
     match case:
         case DropCase():
@@ -226,7 +226,7 @@ def compute(row: Row) -> dict[str, Any]:
     """Return metrics [SI units], core-seconds and failed health checks of a row, or its error."""
     begin = process_time()
     try:
-        metrics, health = judged(read_case(ROOT / "cases" / row.case / "case.toml", row.settings))
+        metrics, health = compute_and_judge(read_case(ROOT / "cases" / row.case / "case.toml", row.settings))
     except (CaseError, RuntimeError) as error:  # a refusal or a failed solution is a result as well
         return {"error": f"{type(error).__name__}: {error}", "core_seconds": process_time() - begin}
     figures: dict[str, Any] = {name: metric["value"] for name, metric in metrics.items()}
@@ -234,7 +234,7 @@ def compute(row: Row) -> dict[str, Any]:
     return figures | {"core_seconds": process_time() - begin, "unmet": unmet}
 
 
-def line(name: str, figures: dict[str, Any]) -> str:
+def format_row(name: str, figures: dict[str, Any]) -> str:
     """Format a row for the terminal."""
     if "error" in figures:
         return f"| {name} | {figures['error'][:120]} ({figures['core_seconds']:.0f} core-s)"
@@ -242,7 +242,7 @@ def line(name: str, figures: dict[str, Any]) -> str:
     return f"| {name} | " + " | ".join(cells) + (f" | FAILED: {figures['unmet']}" if figures["unmet"] else "")
 
 
-def warm() -> None:
+def warm_up() -> None:
     """Load and compile the code that most rows share."""
     compute(drop(5, 60, "solder.numerics.max_steps=3"))
 
@@ -266,11 +266,11 @@ def main() -> None:
         for row in (row for row in TABLES[table] if row.name.startswith(options.only)):
             if (row.name not in rows or options.again) and not options.list:
                 if not is_warm:
-                    warm()
+                    warm_up()
                     is_warm = True
                 rows[row.name] = compute(row)
                 results.write_figures(NAME, stored)
-            print(line(row.name, rows[row.name]) if row.name in rows else f"| {row.name} |", flush=True)
+            print(format_row(row.name, rows[row.name]) if row.name in rows else f"| {row.name} |", flush=True)
 
 
 if __name__ == "__main__":

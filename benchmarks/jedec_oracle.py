@@ -68,7 +68,7 @@ class Setting:
     numerics: dict
 
 
-def input_of(setting: Setting, directory: Path) -> StructureInput:
+def make_input(setting: Setting, directory: Path) -> StructureInput:
     """Mesh the board and return the input of its run."""
     element, formulation = KINDS[setting.kind]
     layer = BoxLayer("board", THICKNESS, setting.cells[2])
@@ -99,10 +99,10 @@ def input_of(setting: Setting, directory: Path) -> StructureInput:
     return request
 
 
-def run(setting: Setting) -> tuple[dict, dict[str, np.ndarray]]:
+def run_setting(setting: Setting) -> tuple[dict, dict[str, np.ndarray]]:
     """Run a setting; return its costs, predicted and measured, and its history."""
     with tempfile.TemporaryDirectory() as directory:
-        request = input_of(setting, Path(directory))
+        request = make_input(setting, Path(directory))
         problem = StructureDynamics.read(MPI.COMM_SELF, request)
         comms = Communicators(MPI.COMM_SELF, problem.place(MPI.COMM_SELF).placement)
         models, model_steps = problem.build(comms, {})
@@ -161,20 +161,20 @@ def step_table(quick: bool) -> list[dict]:
     """Return errors and costs over the step sizes on one mesh."""
     cells = (11, 6, 2) if quick else (33, 19, 2)
     explicit = Setting("incompatible_modes", cells, "explicit", {})
-    _, reference = run(Setting("incompatible_modes", cells, "explicit", {"step_fraction": 0.09}))
+    _, reference = run_setting(Setting("incompatible_modes", cells, "explicit", {"step_fraction": 0.09}))
     settings = [explicit]
     damped = {"hht_alpha": -0.05}
     for count in (25, 50, 100, 200, 400):
         settings.append(Setting("incompatible_modes", cells, "implicit", {"implicit_step": PULSE / count}))
     for count in (50, 100):
         settings.append(Setting("incompatible_modes", cells, "implicit", {"implicit_step": PULSE / count} | damped))
-    return [with_errors(run(setting), reference) | {"numerics": setting.numerics} for setting in settings]
+    return [with_errors(run_setting(setting), reference) | {"numerics": setting.numerics} for setting in settings]
 
 
 def mesh_table(quick: bool) -> list[dict]:
     """Return errors and costs over element kinds, sizes and solvers."""
-    _, reference = run(Setting("incompatible_modes", (22, 13, 2) if quick else FINEST, "implicit", {}))
-    return [with_errors(run(setting), reference) for setting in mesh_settings(quick)]
+    _, reference = run_setting(Setting("incompatible_modes", (22, 13, 2) if quick else FINEST, "implicit", {}))
+    return [with_errors(run_setting(setting), reference) for setting in mesh_settings(quick)]
 
 
 def mesh_settings(quick: bool) -> Iterator[Setting]:
@@ -231,7 +231,7 @@ def factor_row(cells: tuple[int, int, int]) -> dict:
     return row
 
 
-def blas() -> list[str]:
+def find_blas() -> list[str]:
     """Return the BLAS libraries that MUMPS calls, which determine the speed of the factorisation."""
     mapped = {line.split()[-1] for line in Path("/proc/self/maps").read_text().splitlines() if "libblas" in line}
     return sorted(str(Path(path).resolve()) for path in mapped)
@@ -245,7 +245,7 @@ def main() -> None:
     rows = tables["steps"] + tables["meshes"]
     ratios = [row["forecast_seconds"] / row["seconds"] for row in rows]
     result = {
-        "blas": blas(),
+        "blas": find_blas(),
         **tables,
         "forecast_ratio": [min(ratios), max(ratios)],
     }

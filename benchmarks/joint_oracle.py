@@ -34,72 +34,76 @@ PRINTED = ("axial@foot", "shear@foot", "moment@foot", "moment@head", "von_mises@
 Measures = dict[str, float]
 
 
-def oracle(mesh: str, yields: bool) -> Patch:
+def make_oracle(mesh: str, yields: bool) -> Patch:
     """Return the oracle's patch on one of its meshes."""
     return Patch(PATCH, mesh_patch(PATCH, QUADRATIC[mesh], 2), yields)
 
 
-def program(mesh: str | float, course: Course) -> ProgramPatch:
+def make_program_patch(mesh: str | float, course: Course) -> ProgramPatch:
     """Return the program's patch with pads imprinted on a mesh, or tied to boxes of a size [m]."""
     imprinted = isinstance(mesh, str)
     data = matching_mesh(PATCH, TRILINEAR[mesh]) if imprinted else box_mesh(PATCH, TRILINEAR["middle"], mesh, (8, 4))
     return ProgramPatch(PATCH, data, course)
 
 
-def peaks(history: list[Measures]) -> Measures:
+def find_peaks(history: list[Measures]) -> Measures:
     """Return each measure at its largest absolute value."""
     return {name: max((row[name] for row in history), key=abs) for name in history[0] if name != "time"}
 
 
-def elastic() -> dict[str, Callable[[], Measures]]:
+def elastic_rows() -> dict[str, Callable[[], Measures]]:
     """Return the rows of the elastic patch at rest."""
-    rows = {f"oracle, {mesh}": lambda mesh=mesh: equilibrium(oracle(mesh, False))[-1] for mesh in reversed(QUADRATIC)}
+    rows = {
+        f"oracle, {mesh}": lambda mesh=mesh: equilibrium(make_oracle(mesh, False))[-1] for mesh in reversed(QUADRATIC)
+    }
     meshes = {f"program, imprinted, {mesh}": mesh for mesh in TRILINEAR}
     meshes |= {f"program, boxes of {size / UM:g} um": size for size in BOXES}
-    return rows | {name: lambda mesh=mesh: program(mesh, Course()).at_rest() for name, mesh in meshes.items()}
+    return rows | {
+        name: lambda mesh=mesh: make_program_patch(mesh, Course()).at_rest() for name, mesh in meshes.items()
+    }
 
 
-def yielding() -> dict[str, Callable[[], Measures]]:
+def yielding_rows() -> dict[str, Callable[[], Measures]]:
     """Return the rows of the yielding patch at rest."""
     settings = [("middle", 5), ("coarse", 10), ("coarse", 5)]
     return {
-        f"oracle, {mesh}, {steps} steps": lambda mesh=mesh, steps=steps: equilibrium(oracle(mesh, True), steps)[-1]
+        f"oracle, {mesh}, {steps} steps": lambda mesh=mesh, steps=steps: equilibrium(make_oracle(mesh, True), steps)[-1]
         for mesh, steps in settings
     }
 
 
-def blow() -> dict[str, Callable[[], Measures]]:
+def blow_rows() -> dict[str, Callable[[], Measures]]:
     """Return the rows of the elastic patch under a pulse of 20 us."""
     return {
-        f"oracle, {mesh}, {steps} steps": lambda mesh=mesh, steps=steps: peaks(
-            steps_in_time(oracle(mesh, False), haversine(BLOW), BLOW / steps, steps)
+        f"oracle, {mesh}, {steps} steps": lambda mesh=mesh, steps=steps: find_peaks(
+            steps_in_time(make_oracle(mesh, False), haversine(BLOW), BLOW / steps, steps)
         )
         for mesh, steps in [("middle", 160), ("middle", 80), ("coarse", 160)]
     } | {
-        f"program, imprinted, {mesh}": lambda mesh=mesh: peaks(program(mesh, Course(BLOW)).run(100))
+        f"program, imprinted, {mesh}": lambda mesh=mesh: find_peaks(make_program_patch(mesh, Course(BLOW)).run(100))
         for mesh in ("coarse", "middle")
     }
 
 
-def slow() -> dict[str, Callable[[], Measures]]:
+def slow_rows() -> dict[str, Callable[[], Measures]]:
     """Return the rows of the yielding patch under a pulse of 0.2 ms."""
     return {
-        f"oracle, {mesh}, {steps} steps": lambda mesh=mesh, steps=steps: peaks(
-            steps_in_time(oracle(mesh, True), haversine(SLOW), SLOW / steps, round(SHARE * steps))
+        f"oracle, {mesh}, {steps} steps": lambda mesh=mesh, steps=steps: find_peaks(
+            steps_in_time(make_oracle(mesh, True), haversine(SLOW), SLOW / steps, round(SHARE * steps))
         )
         for mesh, steps in (("middle", 40), ("coarse", 40), ("coarse", 80))
     } | {
-        f"program, imprinted, {mesh}": lambda mesh=mesh: peaks(
-            program(mesh, Course(SLOW, True, SCALED)).run(100, SHARE)
+        f"program, imprinted, {mesh}": lambda mesh=mesh: find_peaks(
+            make_program_patch(mesh, Course(SLOW, True, SCALED)).run(100, SHARE)
         )
         for mesh in TRILINEAR
     }
 
 
-TABLES = {"elastic": elastic, "yielding": yielding, "blow": blow, "slow": slow}
+TABLES = {"elastic": elastic_rows, "yielding": yielding_rows, "blow": blow_rows, "slow": slow_rows}
 
 
-def measured(rows: dict[str, Callable[[], Measures]]) -> dict[str, dict]:
+def measure_rows(rows: dict[str, Callable[[], Measures]]) -> dict[str, dict]:
     """Compute the rows of a table and their differences to the first row."""
     table: dict[str, dict] = {}
     for name, compute in rows.items():
@@ -117,5 +121,5 @@ def measured(rows: dict[str, Callable[[], Measures]]) -> dict[str, dict]:
 
 
 if __name__ == "__main__":
-    computed = {name: lambda rows=rows: measured(rows()) for name, rows in TABLES.items()}
+    computed = {name: lambda rows=rows: measure_rows(rows()) for name, rows in TABLES.items()}
     write_tables(__doc__.splitlines()[0], computed, NAME)

@@ -19,7 +19,7 @@ os.environ["OMP_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
 import numpy as np
 
 from benchmarks.support.tables import write_tables
-from benchmarks.tension.scenes import TRACKED, pair
+from benchmarks.tension.scenes import TRACKED, make_pair
 from reflowshock.particles.flows.droplet import Droplet, DropletNumerics
 from reflowshock.particles.parameters.effects import decide_drop, switched
 from reflowshock.particles.parameters.scenes import PROPERTIES, Drop, Drops, Fluid
@@ -66,20 +66,20 @@ def solder(ohnesorge: float) -> Fluid:
     return Fluid(parameters="paper", viscosity=viscosity(ohnesorge), effects=effects, numerics=numerics)
 
 
-def neck(points: np.ndarray, triangles: np.ndarray) -> float:
+def measure_neck(points: np.ndarray, triangles: np.ndarray) -> float:
     """Return the radius over R of a disc with the area of the smallest cross-section between drops that lie along x."""
     heights = np.linspace(-0.3, 0.3, 25) * RADIUS + 1e-9
     turned = np.ascontiguousarray(points[:, [1, 2, 0]])
     return float(np.sqrt(section_areas(turned, triangles, heights).min() / pi)) / RADIUS
 
 
-def state(time: float, points: np.ndarray, triangles: np.ndarray, grown: bool) -> tuple[float, float, float]:
+def measure_state(time: float, points: np.ndarray, triangles: np.ndarray, grown: bool) -> tuple[float, float, float]:
     """Return time [sqrt(rho D^3 / gamma)], neck over R (inf once grown) and length over the merged diameter."""
     length = float(np.ptp(points[:, 0])) / (2.0 * MERGED)
-    return time / UNIT, np.inf if grown else neck(points, triangles), length
+    return time / UNIT, np.inf if grown else measure_neck(points, triangles), length
 
 
-def merged(rows: list, points: np.ndarray, seconds: float) -> dict:
+def summarise_merging(rows: list, points: np.ndarray, seconds: float) -> dict:
     """Return growth rate of the neck, last swing and final radii of merged drops."""
     time, width, length = np.array(rows).T
     low, high = (int(np.argmax(width > share)) for share in GROWTH)
@@ -96,22 +96,22 @@ def merged(rows: list, points: np.ndarray, seconds: float) -> dict:
     }
 
 
-def merging_by_sph(ohnesorge: float, across: int) -> dict:
+def merge_by_sph(ohnesorge: float, across: int) -> dict:
     """Merge two balls by delta-SPH, close enough to merge in the first step."""
     scene = ink(ohnesorge, across)
-    simulation = pair(scene, TRACKED, 1.0, gap=0.9, speed=0.0)
+    simulation = make_pair(scene, TRACKED, 1.0, gap=0.9, speed=0.0)
     simulation.step(1e-9 * UNIT)  # compiles the kernels
     begin, rows = process_time(), []
     while simulation.time < FOLLOWED * UNIT:
         simulation.step(simulation.time_step())
         surface, grown = simulation.surface, bool(rows) and rows[-1][1] > 1.0
-        rows.append(state(simulation.time, surface.points, surface.triangles, grown))
-    figures = merged(rows, surface.points, process_time() - begin)
+        rows.append(measure_state(simulation.time, surface.points, surface.triangles, grown))
+    figures = summarise_merging(rows, surface.points, process_time() - begin)
     volume = surface.volume / (2.0 * VOLUME) - 1.0
     return {"particles": simulation.fluids, "steps": simulation.steps, "volume_error": volume} | figures
 
 
-def merging_by_ispg(ohnesorge: float, in_radius: int) -> dict:
+def merge_by_ispg(ohnesorge: float, in_radius: int) -> dict:
     """Merge two touching balls by ISPG."""
     scene = Drops(
         volume_left=VOLUME, volume_right=VOLUME, distance=2.000002 * RADIUS, spacing=RADIUS / in_radius
@@ -128,14 +128,14 @@ def merging_by_ispg(ohnesorge: float, in_radius: int) -> dict:
         flow.step()
         steps += 1
         grown, count = bool(rows) and rows[-1][1] > 1.0, flow.body.cloud.surface_count
-        rows.append(state(flow.time, flow.body.points[:count], flow.body.triangles, grown))
+        rows.append(measure_state(flow.time, flow.body.points[:count], flow.body.triangles, grown))
     surface = flow.body.points[: flow.body.cloud.surface_count]
-    figures = merged(rows, surface, process_time() - begin)
+    figures = summarise_merging(rows, surface, process_time() - begin)
     volume = flow.body.volume()[0] / (2.0 * VOLUME) - 1.0
     return {"particles": len(flow.body.points), "steps": steps, "volume_error": float(volume)} | figures
 
 
-def cap_by_sph(ohnesorge: float, degrees: float, across: int) -> dict:
+def relax_cap_by_sph(ohnesorge: float, degrees: float, across: int) -> dict:
     """Let a half sphere relax on a wall by delta-SPH."""
     scene = ink(ohnesorge, across, contact_angle=radians(degrees), duration=FOLLOWED * UNIT)
     begin = process_time()
@@ -144,7 +144,7 @@ def cap_by_sph(ohnesorge: float, degrees: float, across: int) -> dict:
     return {"particles": int(metrics["particles"]), "seconds": process_time() - begin} | errors
 
 
-def cap_by_ispg(ohnesorge: float, degrees: float, per_edge: int) -> dict:
+def relax_cap_by_ispg(ohnesorge: float, degrees: float, per_edge: int) -> dict:
     """Let a cube relax on a wall by ISPG."""
     drop = Drop(volume=VOLUME, contact_angle=radians(degrees), particles_per_edge=per_edge)
     begin = process_time()
@@ -160,26 +160,26 @@ def print_row(name: str, row: dict) -> dict:
     return row
 
 
-def merging() -> dict:
+def run_merging() -> dict:
     """Return the figures of merging by both schemes."""
     rows = {}
     for ohnesorge in OHNESORGE:
-        for scheme, run, sizes in (("delta-SPH", merging_by_sph, ACROSS), ("ISPG", merging_by_ispg, IN_RADIUS)):
+        for scheme, run, sizes in (("delta-SPH", merge_by_sph, ACROSS), ("ISPG", merge_by_ispg, IN_RADIUS)):
             for size in sizes:
                 name = f"Oh {ohnesorge:g}, {scheme}, {size}"
                 rows[name] = print_row(name, run(ohnesorge, size))
     return rows
 
 
-def caps() -> dict:
+def run_caps() -> dict:
     """Return the figures of caps by both schemes for the more viscous liquid, since the other one still swings."""
     rows, ohnesorge = {}, OHNESORGE[-1]
     for degrees in ANGLES:
-        for scheme, run, size in (("delta-SPH", cap_by_sph, ACROSS[-1]), ("ISPG", cap_by_ispg, PER_EDGE)):
+        for scheme, run, size in (("delta-SPH", relax_cap_by_sph, ACROSS[-1]), ("ISPG", relax_cap_by_ispg, PER_EDGE)):
             name = f"{degrees:g} degrees, {scheme}, {size}"
             rows[name] = print_row(name, run(ohnesorge, degrees, size))
     return rows
 
 
 if __name__ == "__main__":
-    write_tables(__doc__.splitlines()[0], {"merging": merging, "caps": caps}, NAME)
+    write_tables(__doc__.splitlines()[0], {"merging": run_merging, "caps": run_caps}, NAME)

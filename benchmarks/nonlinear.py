@@ -38,15 +38,15 @@ import numpy as np
 from mpi4py import MPI
 
 from benchmarks import peers
-from benchmarks.coupling_stability import GROWTH, grid
-from benchmarks.internal_force import RATE, STRAINS, linear, plastic, turning
+from benchmarks.coupling_stability import GROWTH, sample_grid
+from benchmarks.internal_force import RATE, STRAINS, corotational_force, linear_force, plastic_force
 from benchmarks.support import results, turns
 from benchmarks.support.cube import SOLDER, STEEL, cube, elements_of, random_displacement
 from benchmarks.support.drop_scene import DropScene
 from benchmarks.support.newton_steps import take_implicit_steps
 from benchmarks.support.program_run import ProgramRun
 from benchmarks.support.stored_rows import StoredRows
-from benchmarks.support.whole_runs import found_in_runs
+from benchmarks.support.whole_runs import read_run_figures
 from benchmarks.two_scale import CRITICAL, PULSE, REDUCED, SHORT, STRETCH
 from reflowshock.cases.hard.trials.beams import bent_moment
 from reflowshock.cases.hard.trials.bodies import motion_of, nonlinear_body
@@ -99,35 +99,35 @@ PEER_BAR, SAME_FORCES = 20.0, 1e-3  # of J2 and of Green's strain instead of the
 Bars = dict[str, dict[str, Any]]
 
 
-def forces() -> tuple[Bars, dict]:
+def measure_forces() -> tuple[Bars, dict]:
     """Return element updates per second."""
     boxes, small = cube(), cube(distorted=True, edge=12)
     body, critical = nonlinear_body(boxes, STEEL, ForceOptions("corotational", 1e-8), "incompatible_modes")
     motion = motion_of(body, 0.5 * critical)
     motion.displacement[:] = random_displacement(body.local.points, 1e-3)
     works = {
-        "linear_boxes": linear(elements_of(boxes)),
-        "turning_boxes": turning(elements_of(boxes)),
+        "linear_boxes": linear_force(elements_of(boxes)),
+        "turning_boxes": corotational_force(elements_of(boxes)),
         "turning_boxes_step": lambda: motion.take_steps(1),
-        "turning_any": turning(elements_of(small)),
+        "turning_any": corotational_force(elements_of(small)),
     }
     for kind in ("one_point", "incompatible_modes"):
         for name, strain in STRAINS.items():
-            works[f"{name}_{kind}"] = plastic(elements_of(small, kind, SOLDER), "finite", strain)
+            works[f"{name}_{kind}"] = plastic_force(elements_of(small, kind, SOLDER), "finite", strain)
     counts = dict.fromkeys(works, len(small.cells)) | dict.fromkeys(list(works)[:3], len(boxes.cells))
-    batches = {name: turns.batch(work) for name, work in works.items()}
+    batches = {name: turns.make_batch(work) for name, work in works.items()}
     akantu = akantu_loop(boxes, random_displacement(boxes.points))
     if akantu:
         batches["akantu"] = lambda: akantu.ask("force")
         counts["akantu"] = len(boxes.cells)
-    seconds = turns.in_turns(batches)
+    seconds = turns.measure_in_turns(batches)
     if akantu:
         akantu.end()
     rates = turns.rates(seconds, counts)
     bars = {
         "finite rotation, elastic boxes, force [updates/s]": turns.bar(rates["turning_boxes"], 18e6),
         "finite rotation, whole step / force": turns.bar(
-            turns.ratio(seconds, "turning_boxes_step", "turning_boxes"), 0.8
+            turns.speed_ratio(seconds, "turning_boxes_step", "turning_boxes"), 0.8
         ),
         "solder below yield, one point [updates/s]": turns.bar(rates["below_yield_one_point"], 4e6),
         f"solder that flows at {RATE:g} 1/s, one point [updates/s]": turns.bar(rates["yielding_one_point"], 2e6),
@@ -135,7 +135,7 @@ def forces() -> tuple[Bars, dict]:
         "solder that flows, incompatible modes [updates/s]": turns.bar(rates["yielding_incompatible_modes"], 2e6),
     }
     if akantu:
-        faster = turns.ratio(seconds, "turning_boxes", "akantu")
+        faster = turns.speed_ratio(seconds, "turning_boxes", "akantu")
         bars["finite rotation over Akantu's linear loop"] = turns.bar(faster, 60.0)
     return bars, {"updates_per_second": rates}
 
@@ -146,30 +146,30 @@ def akantu_loop(mesh, displacement: np.ndarray) -> "peers.Peer | None":
     return peers.Peer("akantu", peers.write_problem(mesh, displacement, 1e-8)) if "akantu" in peers.install() else None
 
 
-def against_peers() -> tuple[Bars, dict]:
+def compare_with_peers() -> tuple[Bars, dict]:
     """Return whole steps in finite rotation over those of peers, from states with equal forces."""
     mesh, installed = cube(distorted=True, edge=12), peers.install()
     bars, rest = {}, {}
     for law, (material, strain, names, kinds) in PEERS.items():
         displacement = mesh.points @ (TURN @ (np.eye(3) + strain * STRETCHED) - np.eye(3)).T
-        motions = {kind: moved_body(mesh, material, kind, displacement) for kind in kinds}
+        motions = {kind: move_body(mesh, material, kind, displacement) for kind in kinds}
         problem_file = peers.write_problem(mesh, displacement, motions[kinds[0]].step, material, finite=True)
         running = {name: peers.Peer(name, problem_file) for name in names if name in installed}
         force = np.zeros_like(displacement)
         force[motions[kinds[0]].body.local.nodes] = motions[kinds[0]].force
-        batches = {kind: turns.batch(partial(motion.take_steps, 1)) for kind, motion in motions.items()}
-        seconds = turns.in_turns(batches | {name: partial(peer.ask, "step") for name, peer in running.items()})
+        batches = {kind: turns.make_batch(partial(motion.take_steps, 1)) for kind, motion in motions.items()}
+        seconds = turns.measure_in_turns(batches | {name: partial(peer.ask, "step") for name, peer in running.items()})
         rest[law] = turns.rates(seconds, dict.fromkeys(seconds, len(mesh.cells)))
         for name, peer in running.items():
             peer.end()
             difference = float(np.abs(peer.force - force).max() / np.abs(force).max())
             bars[f"{law}: forces of {name} against ours"] = turns.bar(difference, SAME_FORCES, False)
             for kind in kinds:
-                bars[f"{law}: steps, {kind} over {name}"] = turns.bar(turns.ratio(seconds, kind, name), PEER_BAR)
+                bars[f"{law}: steps, {kind} over {name}"] = turns.bar(turns.speed_ratio(seconds, kind, name), PEER_BAR)
     return bars, {"steps, updates_per_second": rest}
 
 
-def moved_body(mesh: MeshData, material: Material, kind: str, displacement: np.ndarray) -> ExplicitMotion:
+def move_body(mesh: MeshData, material: Material, kind: str, displacement: np.ndarray) -> ExplicitMotion:
     """Return a body in finite rotation at a displacement [m], shape (n, 3), with its force there."""
     step = 0.5 * nonlinear_body(mesh, material, ForceOptions("corotational"), kind)[1]
     motion = motion_of(nonlinear_body(mesh, material, ForceOptions("corotational", step), kind)[0], step)
@@ -178,7 +178,7 @@ def moved_body(mesh: MeshData, material: Material, kind: str, displacement: np.n
     return motion
 
 
-def bending() -> tuple[Bars, dict]:
+def measure_bending() -> tuple[Bars, dict]:
     """Return the accuracy lost by the one-point element."""
     moments = {name: bent_moment(name, 4) for name in ("one_point", "incompatible_modes")}
     stiffness = [element_stiffness(elements_of(cube(True, 4), name)) for name in moments]
@@ -190,13 +190,13 @@ def bending() -> tuple[Bars, dict]:
     return bars, {"hinge_moments": moments}
 
 
-def effects() -> tuple[Bars, dict]:
+def measure_effects() -> tuple[Bars, dict]:
     """Return the cost of windows with each effect."""
     with tempfile.TemporaryDirectory() as folder:
         scene = DropScene.write(Path(folder), (*REDUCED, MATERIAL))
         runs = {name: ProgramRun(scene.request("two_scale", *side)) for name, side in SIDES.items()}
     seconds = seconds_of(runs)
-    cost = {name: turns.ratio(seconds, "linear", name) for name in runs}
+    cost = {name: turns.speed_ratio(seconds, "linear", name) for name in runs}
     bars = {
         "finite rotation in bga_drop, over linear": turns.bar(cost["turning"] - 1.0, 1.2, False),
         "yielding in bga_drop, over linear": turns.bar(cost["yielding"] - 1.0, 1.0, False),
@@ -208,10 +208,10 @@ def seconds_of(runs: dict[str, ProgramRun]) -> dict[str, np.ndarray]:
     """Return the processor seconds per simulated second of runs, measured in turns."""
     for run in runs.values():
         run.step(STRETCH)
-    return turns.in_turns({name: lambda run=run: run.step(STRETCH) for name, run in runs.items()}, ROUNDS)
+    return turns.measure_in_turns({name: lambda run=run: run.step(STRETCH) for name, run in runs.items()}, ROUNDS)
 
 
-def interpreter() -> tuple[Bars, dict]:
+def measure_interpreter() -> tuple[Bars, dict]:
     """Return the Python overhead [s] of a substep of a meso model."""
     with tempfile.TemporaryDirectory() as folder:
         scene = DropScene.write(Path(folder), (*REDUCED, MATERIAL, "scale=quick"))
@@ -222,13 +222,13 @@ def interpreter() -> tuple[Bars, dict]:
         "at_once": lambda: motion.take_steps(steps),
         "one_by_one": lambda: ExplicitMotion._take_single_steps(motion, steps, None),
     }
-    seconds = turns.in_turns({name: turns.batch(work) for name, work in works.items()})
+    seconds = turns.measure_in_turns({name: turns.make_batch(work) for name, work in works.items()})
     spared = float(np.median(seconds["one_by_one"] - seconds["at_once"])) / steps
     each = {name: float(values.min()) / steps for name, values in seconds.items()}
     return {}, {"substep_seconds": each, "spared_a_substep": spared, "elements": run.elements}
 
 
-def two_scales() -> tuple[Bars, dict]:
+def measure_two_scales() -> tuple[Bars, dict]:
     """Return core-seconds of two scales over those of one model."""
     with tempfile.TemporaryDirectory() as folder:
         scene = DropScene.write(Path(folder), (*REDUCED, MATERIAL))
@@ -237,7 +237,7 @@ def two_scales() -> tuple[Bars, dict]:
             for name, fine in FINE.items()
         } | {"dns": ProgramRun(scene.request("dns", {}, FINITE))}
     seconds = seconds_of(runs)
-    ratios = {name: turns.ratio(seconds, "dns", name) for name in FINE}
+    ratios = {name: turns.speed_ratio(seconds, "dns", name) for name in FINE}
     plans = {name: {"window_ns": 1e9 * run.plan.window, "substeps": run.plan.substeps} for name, run in runs.items()}
     bars = {
         "two scales over one model, 3 fine joints": turns.bar(ratios["three_joints"], 0.12, False),
@@ -246,7 +246,7 @@ def two_scales() -> tuple[Bars, dict]:
     return bars, {"ratios": ratios, "plans": plans, "elements": {name: run.elements for name, run in runs.items()}}
 
 
-def errors(formulation: str = "one_point") -> tuple[Bars, dict]:
+def measure_errors(formulation: str = "one_point") -> tuple[Bars, dict]:
     """Return errors of the critical joint against one model."""
     shock = FINITE | {
         "formulation": formulation,
@@ -275,7 +275,7 @@ def errors(formulation: str = "one_point") -> tuple[Bars, dict]:
     return bars, rows
 
 
-def implicit() -> tuple[Bars, dict]:
+def measure_implicit() -> tuple[Bars, dict]:
     """Return cost and errors of implicit steps for the pulse of ``errors`` and one five times as long."""
     rows: dict[str, dict] = {}
     for pulse in (PULSE, 5.0 * PULSE):
@@ -301,7 +301,7 @@ def implicit() -> tuple[Bars, dict]:
     return {}, rows
 
 
-def drift() -> tuple[Bars, dict]:
+def measure_drift() -> tuple[Bars, dict]:
     """Return the energy drift of each scheme over many windows in finite rotation."""
     bars, rows = {}, {}
     for name, pair in DRIFTING.items():
@@ -324,7 +324,7 @@ def drift() -> tuple[Bars, dict]:
     return bars, rows
 
 
-def growth(every: int = 1, formulation: str = "one_point") -> tuple[Bars, dict]:
+def measure_growth(every: int = 1, formulation: str = "one_point") -> tuple[Bars, dict]:
     """Return how many windows grow and the largest growth of each scheme, over every ``every``-th pair of the grid.
 
     Each pair is stored in ``build`` when it is done, so that an interrupted run continues.
@@ -332,9 +332,9 @@ def growth(every: int = 1, formulation: str = "one_point") -> tuple[Bars, dict]:
     stored_rows = StoredRows(BUILD / f"growth-{formulation}.jsonl", formulation)
     growth_rates: dict[str, dict[str, float]] = {name: {} for name in ALONG_PATHS}
     levels: dict[str, int] = {}
-    for number, (pair, fraction) in enumerate(list(grid())[::every], 1):
+    for number, (pair, fraction) in enumerate(list(sample_grid())[::every], 1):
         label = f"{pair!r} at {fraction}"
-        row = stored_rows.get(label, partial(window_growth, pair, fraction, formulation))
+        row = stored_rows.get(label, partial(measure_window_growth, pair, fraction, formulation))
         for name, values in growth_rates.items():
             values[label] = row[name]
         levels[label] = row["levels"]
@@ -348,7 +348,7 @@ def growth(every: int = 1, formulation: str = "one_point") -> tuple[Bars, dict]:
     return bars, {"samples": len(levels), "with_levels": sum(count > 1 for count in levels.values()), "worst": worst}
 
 
-def window_growth(pair: Pair, fraction: float, formulation: str) -> dict[str, float]:
+def measure_window_growth(pair: Pair, fraction: float, formulation: str) -> dict[str, float]:
     """Return the growth of a window by each scheme, and the number of step levels of the first scheme."""
     growth_rates: dict[str, float] = {}
     for name in ALONG_PATHS:
@@ -359,11 +359,20 @@ def window_growth(pair: Pair, fraction: float, formulation: str) -> dict[str, fl
     return growth_rates
 
 
-PARTS = {
-    part.__name__: part
-    for part in (forces, against_peers, bending, effects, interpreter, two_scales, errors, implicit, drift, growth)
+PARTS: dict[str, Callable[..., tuple[Bars, dict]]] = {
+    "forces": measure_forces,
+    "against_peers": compare_with_peers,
+    "bending": measure_bending,
+    "effects": measure_effects,
+    "interpreter": measure_interpreter,
+    "two_scales": measure_two_scales,
+    "errors": measure_errors,
+    "implicit": measure_implicit,
+    "drift": measure_drift,
+    "growth": measure_growth,
+    "errors_of_modes": partial(measure_errors, formulation="incompatible_modes"),
+    "growth_of_modes": partial(measure_growth, formulation="incompatible_modes"),
 }
-PARTS |= {f"{part.__name__}_of_modes": partial(part, formulation="incompatible_modes") for part in (errors, growth)}
 
 
 def main() -> None:
@@ -378,7 +387,7 @@ def main() -> None:
         bars, rest = parts[name]()
         figures["bars"] |= bars
         figures[name] = rest
-        bars, figures["not_measured"] = found_in_runs()
+        bars, figures["not_measured"] = read_run_figures()
         figures["bars"] |= bars
         results.write_and_print("nonlinear", figures)
 

@@ -124,7 +124,7 @@ def model_arrays(mesh: MeshData, material: np.ndarray, materials: Sequence[Isotr
     }
 
 
-def own_batches(mesh: MeshData, displacement: np.ndarray) -> tuple[dict[str, turns.Batch], np.ndarray, float]:
+def program_batches(mesh: MeshData, displacement: np.ndarray) -> tuple[dict[str, turns.Batch], np.ndarray, float]:
     """Return this program's batches, its force at the displacement, and half the critical step [s]."""
     elements = elements_of(mesh)
     terms = {"congruent": CongruentElements.build(elements), "assembled": AssembledElements.build(elements)}
@@ -140,9 +140,10 @@ def own_batches(mesh: MeshData, displacement: np.ndarray) -> tuple[dict[str, tur
         motion.update_force()
 
     batches = {
-        f"{name}_force": turns.batch(lambda term=term: term.add(displacement, scratch)) for name, term in terms.items()
+        f"{name}_force": turns.make_batch(lambda term=term: term.add(displacement, scratch))
+        for name, term in terms.items()
     }
-    return batches | {"congruent_step": turns.batch(step)}, force, 0.5 * critical
+    return batches | {"congruent_step": turns.make_batch(step)}, force, 0.5 * critical
 
 
 def main() -> None:
@@ -151,7 +152,7 @@ def main() -> None:
     mesh = cube()
     gradient = np.random.default_rng(2).uniform(-1e-3, 1e-3, (3, 3))
     displacement = mesh.points @ gradient.T
-    batches, force, step = own_batches(mesh, displacement)
+    batches, force, step = program_batches(mesh, displacement)
     problem_file = write_problem(mesh, displacement, step)
     peers = {name: Peer(name, problem_file) for name in names}
     for name, peer in peers.items():
@@ -162,12 +163,12 @@ def main() -> None:
             )
         for work in WORKS[name]:
             batches[f"{name}_{work}"] = lambda peer=peer, work=work: peer.ask(work)
-    seconds = turns.in_turns(batches, ROUNDS)
+    seconds = turns.measure_in_turns(batches, ROUNDS)
     for peer in peers.values():
         peer.end()
     pairs = [(f"congruent_{work}", f"{name}_{work}") for name in peers for work in WORKS[name]]
     pairs += [("assembled_force", f"{name}_force") for name in peers if "force" in WORKS[name]]
-    ratios = {f"{ours} / {theirs}": turns.ratio(seconds, ours, theirs) for ours, theirs in pairs}
+    ratios = {f"{ours} / {theirs}": turns.speed_ratio(seconds, ours, theirs) for ours, theirs in pairs}
     results.write_and_print(
         "peers",
         {

@@ -67,7 +67,7 @@ def measure(world: MPI.Comm, request: RunInput) -> dict:
     }
 
 
-def requests(folder: Path) -> dict[str, RunInput]:
+def write_inputs(folder: Path) -> dict[str, RunInput]:
     """Write the meshes to a folder; return the inputs of both schemes and of the nonlinear case on one rank."""
     for name in ("linear", "nonlinear"):
         (folder / name).mkdir()
@@ -78,7 +78,7 @@ def requests(folder: Path) -> dict[str, RunInput]:
     return inputs
 
 
-def placed(inputs: dict[str, RunInput], size: int) -> dict[str, str]:
+def with_placements(inputs: dict[str, RunInput], size: int) -> dict[str, str]:
     """Return the inputs with all placements on ``size`` ranks."""
     table = {}
     for name, request in inputs.items():
@@ -92,17 +92,19 @@ def placed(inputs: dict[str, RunInput], size: int) -> dict[str, str]:
 def main(counts: list[int]) -> None:
     table: dict[str, dict] = {}
     with tempfile.TemporaryDirectory() as folder:
-        inputs, path = requests(Path(folder)), Path(folder) / "requests.json"
+        inputs, path = write_inputs(Path(folder)), Path(folder) / "requests.json"
         for count in counts:
-            path.write_text(json.dumps(placed(inputs, count)))
+            path.write_text(json.dumps(with_placements(inputs, count)))
             program = [sys.executable, "-m", "mpi4py", __file__, str(path)]
             command = mpi_command(count, program, oversubscribe=True)
             subprocess.run(command, env=without_mpi_job(os.environ), stdout=subprocess.DEVNULL, check=True)
             table |= json.loads(path.read_text())
-    results.write_and_print("placement", {"rows": table, "bars": {name: bars(row) for name, row in table.items()}})
+    results.write_and_print(
+        "placement", {"rows": table, "bars": {name: judge_placement(row) for name, row in table.items()}}
+    )
 
 
-def bars(row: dict) -> dict:
+def judge_placement(row: dict) -> dict:
     """Return the limits of a placement; the busy share counts only where ranks share both models."""
     figures = {
         "error of the prediction": turns.bar(abs(row["measured / predicted"] - 1.0), PREDICTION, at_least=False),
@@ -111,7 +113,7 @@ def bars(row: dict) -> dict:
     return figures | ({"busy_share": turns.bar(row["busy_share"], BUSY)} if row["chosen"].startswith("shared") else {})
 
 
-def on_ranks(world: MPI.Comm, path: Path) -> None:
+def measure_on_ranks(world: MPI.Comm, path: Path) -> None:
     """Measure the inputs of a file and overwrite the file with the results."""
     inputs = json.loads(path.read_text())
     rows = {name: measure(world, RunInput.model_validate_json(text)) for name, text in inputs.items()}
@@ -121,6 +123,6 @@ def on_ranks(world: MPI.Comm, path: Path) -> None:
 
 if __name__ == "__main__":
     if sys.argv[-1].endswith(".json"):
-        on_ranks(MPI.COMM_WORLD, Path(sys.argv[-1]))
+        measure_on_ranks(MPI.COMM_WORLD, Path(sys.argv[-1]))
     else:
         main([int(value) for value in sys.argv[1:]] or [1, 2])

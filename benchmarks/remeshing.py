@@ -14,7 +14,7 @@ NAME = "remeshing"
 WORST = ("volume_error", "standoff_error", "contact_area_error", "shape_deviation", "tries")
 
 
-def summary(kind: str, joints: list[dict]) -> dict:
+def summarise(kind: str, joints: list[dict]) -> dict:
     """Return counts and worst values of one kind."""
     meshed = [joint for joint in joints if joint["method"] != "refused"]
     return {
@@ -33,7 +33,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true")
     joints = [outcome(sample) for sample in samples(8 if parser.parse_args().quick else 1)]
     table = [
-        summary(kind, joints_of_kind)
+        summarise(kind, joints_of_kind)
         for kind in COUNTS
         if (joints_of_kind := [joint for joint in joints if joint["kind"] == kind])
     ]

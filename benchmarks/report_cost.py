@@ -18,14 +18,14 @@ NAME = "report_cost"
 CASE, RUN = ROOT / "tests/pipeline/small.toml", ROOT / "build/report_cost"
 
 
-def small_run() -> Path:
+def run_small_case() -> Path:
     """Run the shortened case unless it exists; return its folder."""
     line = [sys.executable, "-m", "reflowshock", "run", str(CASE), "--out", str(RUN)]
     subprocess.run(line, check=True, cwd=ROOT)
     return RUN
 
 
-def cost(run: Path) -> dict:
+def measure_cost(run: Path) -> dict:
     """Write the report of a run in a separate process; return its cost."""
     line = [sys.executable, __file__, "--one", str(run)]
     output = subprocess.run(line, check=True, cwd=ROOT, capture_output=True, text=True).stdout
@@ -48,7 +48,7 @@ if __name__ == "__main__":
     if sys.argv[1:2] == ["--one"]:
         print(json.dumps(render_once(Path(sys.argv[2]))))
         raise SystemExit
-    rows = [cost(run) for run in map(Path, sys.argv[1:])] or [cost(small_run())]
+    rows = [measure_cost(run) for run in map(Path, sys.argv[1:])] or [measure_cost(run_small_case())]
     results.write_figures(NAME, {"reports": rows})
     for row in rows:
         print("{run}: {processor_seconds:.2f} s, {bytes} B; loading the program {loading_seconds:.2f} s".format(**row))

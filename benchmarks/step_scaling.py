@@ -28,7 +28,7 @@ from reflowshock.cases.hard.trials.bodies import motion_of
 from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.loads.load import Load, half_sine_drop
-from reflowshock.fem.model.assembly import make_body, make_pieces
+from reflowshock.fem.model.assembly import make_body, make_rank_elements
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.parallel.mpi_environment import without_mpi_job
 from reflowshock.materials.roles import Materials
@@ -40,15 +40,19 @@ PULSE = half_sine_drop(peak=1.5e4, duration=5e-4)
 NAP = 1e-3  # [s]
 
 
-def motion_on(comm: MPI.Comm, loads: list[Load]) -> ExplicitMotion:
+def make_motion(comm: MPI.Comm, loads: list[Load]) -> ExplicitMotion:
     """Return the cube at rest, distributed over the ranks."""
     item = prepare(cube(), "dns")["dns"]
-    pieces = make_pieces(distribute(comm, item.mesh if comm.rank == 0 else None), item.tables, Materials(board=STEEL))
-    body = make_body(comm, pieces, item.tables, np.ones(len(pieces.steps)))
-    return motion_of(body, FRACTION * comm.allreduce(float(pieces.steps.min()), MPI.MIN), loads)
+    rank_elements = make_rank_elements(
+        distribute(comm, item.mesh if comm.rank == 0 else None), item.tables, Materials(board=STEEL)
+    )
+    body = make_body(comm, rank_elements, item.tables, np.ones(len(rank_elements.steps)))
+    return motion_of(body, FRACTION * comm.allreduce(float(rank_elements.steps.min()), MPI.MIN), loads)
 
 
-def step(motion: ExplicitMotion) -> Callable[[], None]:
+def step_of(motion: ExplicitMotion) -> Callable[[], None]:
+    """Return a function that takes one whole step."""
+
     def work() -> None:
         motion.advance()
         motion.update_force()
@@ -56,7 +60,8 @@ def step(motion: ExplicitMotion) -> Callable[[], None]:
     return work
 
 
-def force(motion: ExplicitMotion) -> Callable[[], None]:
+def force_of(motion: ExplicitMotion) -> Callable[[], None]:
+    """Return a function that evaluates the internal force."""
     scratch = np.zeros_like(motion.force)
 
     def work() -> None:
@@ -66,7 +71,7 @@ def force(motion: ExplicitMotion) -> Callable[[], None]:
     return work
 
 
-def least_wall(comm: MPI.Comm, work: Callable[[], None]) -> float:
+def measure_least_wall(comm: MPI.Comm, work: Callable[[], None]) -> float:
     """Return the minimum wall seconds of a call on the slower rank."""
     walls = np.empty(CALLS)
     for k in range(CALLS):
@@ -78,7 +83,7 @@ def least_wall(comm: MPI.Comm, work: Callable[[], None]) -> float:
     return float(walls.min())
 
 
-def asleep(comm: MPI.Comm) -> None:
+def wait_asleep(comm: MPI.Comm) -> None:
     """Wait for the other rank without using its core."""
     request = comm.Ibarrier()
     while not request.Test():
@@ -87,11 +92,11 @@ def asleep(comm: MPI.Comm) -> None:
 
 def measure(world: MPI.Comm) -> dict[str, float]:
     """Return the minimum wall seconds of each work; single-rank values on rank 0 only."""
-    both = motion_on(world, [])
-    works = {"step_2": (world, step(both)), "force_2": (world, force(both))}
+    both = make_motion(world, [])
+    works = {"step_2": (world, step_of(both)), "force_2": (world, force_of(both))}
     if world.rank == 0:
-        alone, drop = (motion_on(MPI.COMM_SELF, loads) for loads in ([], [PULSE]))
-        single = {"step_1": step(alone), "force_1": force(alone), "drop_1": step(drop)}
+        alone, drop = (make_motion(MPI.COMM_SELF, loads) for loads in ([], [PULSE]))
+        single = {"step_1": step_of(alone), "force_1": force_of(alone), "drop_1": step_of(drop)}
         works = {name: (MPI.COMM_SELF, work) for name, work in single.items()} | works
     for _, work in works.values():
         work()
@@ -99,8 +104,8 @@ def measure(world: MPI.Comm) -> dict[str, float]:
     for _ in range(ROUNDS):
         for name, (comm, work) in works.items():
             if name == "step_2":
-                asleep(world)
-            least[name] = min(least[name], least_wall(comm, work))
+                wait_asleep(world)
+            least[name] = min(least[name], measure_least_wall(comm, work))
     return least
 
 

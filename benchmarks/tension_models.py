@@ -23,8 +23,17 @@ from matplotlib.ticker import NullFormatter
 
 from benchmarks.support import results
 from benchmarks.support.tables import write_tables
-from benchmarks.support.turns import batch, in_turns
-from benchmarks.tension.scenes import MODELS, TRACKED, at_rest, cap_at_rest, merging, start, swing, unit_drop
+from benchmarks.support.turns import make_batch, measure_in_turns
+from benchmarks.tension.scenes import (
+    MODELS,
+    TRACKED,
+    run_cap_to_rest,
+    run_merging,
+    run_swing,
+    run_to_rest,
+    set_up_drop,
+    unit_drop,
+)
 
 mpl.use("Agg")
 NAME = "tension_models"
@@ -42,37 +51,40 @@ DRAWN = {
 }
 
 
-def strength() -> float:
+def calibrate_strength() -> float:
     """Return the strength of the pairwise forces over theory that gives a sphere its exact pressure."""
-    return 1.0 / (1.0 + at_rest("pairwise", SPHERE, 1.0, "sphere")["pressure_error"])
+    return 1.0 / (1.0 + run_to_rest("pairwise", SPHERE, 1.0, "sphere")["pressure_error"])
 
 
 @cache
-def calibrated() -> float:
+def read_or_calibrate_strength() -> float:
     """Return the stored strength, or calibrate it."""
     figures = results.read_figures(NAME)
-    return figures.get("strength") or strength()
+    return figures.get("strength") or calibrate_strength()
 
 
-def models(scene, sizes: tuple[int, ...]) -> dict:
+def run_models(scene, sizes: tuple[int, ...]) -> dict:
     """Run the scene with each model and size."""
     rows = {}
     for model in MODELS:
-        rows[model] = {str(size): scene(model, size, calibrated() if model == "pairwise" else 1.0) for size in sizes}
+        rows[model] = {
+            str(size): scene(model, size, read_or_calibrate_strength() if model == "pairwise" else 1.0)
+            for size in sizes
+        }
         for size, row in rows[model].items():
             printed = {key: f"{value:.4g}" if isinstance(value, float) else value for key, value in row.items()}
             print(f"  {model}, {size}:", "  ".join(f"{key} {value}" for key, value in printed.items()), flush=True)
     return rows
 
 
-def cost() -> dict:
+def measure_cost() -> dict:
     """Return microseconds per particle-step of a drop at rest with each model, and the ratio to the tracked surface."""
 
     def step_of(simulation):
-        return batch(lambda: simulation.step(simulation.time_step()), 0.5)
+        return make_batch(lambda: simulation.step(simulation.time_step()), 0.5)
 
-    drops = {model: start(unit_drop(SPHERE, 0.2), model, calibrated()) for model in MODELS}
-    seconds = in_turns({model: step_of(drop) for model, drop in drops.items()})
+    drops = {model: set_up_drop(unit_drop(SPHERE, 0.2), model, read_or_calibrate_strength()) for model in MODELS}
+    seconds = measure_in_turns({model: step_of(drop) for model, drop in drops.items()})
     tracked = seconds[TRACKED]
     figures = {
         model: {
@@ -109,13 +121,13 @@ if __name__ == "__main__":
     write_tables(
         __doc__.splitlines()[0],
         {
-            "strength": strength,
-            "cost": cost,
-            "rest": partial(models, at_rest, SIZES),
-            "swing": partial(models, swing, SIZES),
-            "merging": partial(models, merging, SMALLER),
-            "cap_60": partial(models, partial(cap_at_rest, 60.0), SIZES),
-            "cap_120": partial(models, partial(cap_at_rest, 120.0), SIZES),
+            "strength": calibrate_strength,
+            "cost": measure_cost,
+            "rest": partial(run_models, run_to_rest, SIZES),
+            "swing": partial(run_models, run_swing, SIZES),
+            "merging": partial(run_models, run_merging, SMALLER),
+            "cap_60": partial(run_models, partial(run_cap_to_rest, 60.0), SIZES),
+            "cap_120": partial(run_models, partial(run_cap_to_rest, 120.0), SIZES),
         },
         NAME,
     )

@@ -54,7 +54,7 @@ REFERENCE = (22, 3)
 BOARDS = {"as meshed for the shock, 0.5 mm": 0.5e-3, "as meshed for the shock, 2 mm": 2e-3, "heated": None}
 
 
-def package(cells: int, layers: int) -> MeshData:
+def mesh_package(cells: int, layers: int) -> MeshData:
     """Return the quarter package with ``cells`` along the substrate and ``layers`` through substrate and die."""
     x = np.linspace(0.0, SUBSTRATE, cells + 1)
     points, hexahedra = grid(x, x, np.linspace(0.0, 2.0 * THICKNESS, 2 * layers + 1))
@@ -72,7 +72,7 @@ def warpage(points: np.ndarray, displacement: np.ndarray) -> float:
     return float(displacement[ends[0], 2] - displacement[ends[1], 2])
 
 
-def ours(mesh: MeshData) -> tuple[float, dict]:
+def solve_by_program(mesh: MeshData) -> tuple[float, dict]:
     """Return warpage and costs of the program's hexahedra, with a detached cell of board that the tables require."""
     board = mesh_of(*grid([0.0, SUBSTRATE], [0.0, SUBSTRATE], [-2e-3, -1e-3]), "board", {"symmetry_x": on(0, 0.0)})
     both = append([board, mesh])
@@ -83,7 +83,7 @@ def ours(mesh: MeshData) -> tuple[float, dict]:
     return warpage(mesh.points, moved[len(board.points) :]), costs
 
 
-def peer(mesh: MeshData, degree: int) -> tuple[float, dict]:
+def solve_by_dolfinx(mesh: MeshData, degree: int) -> tuple[float, dict]:
     """Return warpage and costs of Lagrange hexahedra of a degree assembled by DOLFINx."""
     domain = dolfinx_api.make_mesh(MPI.COMM_SELF, mesh.points, mesh.cells)
     kind = ("Lagrange", degree)
@@ -98,7 +98,7 @@ def peer(mesh: MeshData, degree: int) -> tuple[float, dict]:
         free = ufl.as_vector([RISE * value for value in material.expansion] + [0.0] * 3)
         work += share * ufl.inner(elasticity * strain(trial), strain(test)) * ufl.dx(metadata=quadrature)
         load += share * ufl.inner(elasticity * free, strain(test)) * ufl.dx(metadata=quadrature)
-    held = symmetry(domain, space)
+    held = symmetry_conditions(domain, space)
     matrix = dolfinx.fem.petsc.assemble_matrix(dolfinx.fem.form(work), held)
     matrix.assemble()
     right = dolfinx.fem.petsc.assemble_vector(dolfinx.fem.form(load))
@@ -115,7 +115,7 @@ def strain(field: ufl.core.expr.Expr) -> ufl.core.expr.Expr:
     return ufl.as_vector([e[0, 0], e[1, 1], e[2, 2], 2 * e[0, 1], 2 * e[1, 2], 2 * e[0, 2]])
 
 
-def symmetry(domain: dolfinx.mesh.Mesh, space: dolfinx.fem.FunctionSpace) -> list:
+def symmetry_conditions(domain: dolfinx.mesh.Mesh, space: dolfinx.fem.FunctionSpace) -> list:
     """Return the conditions of symmetry planes and the fixed height of one point."""
     held = []
     for axis in range(3):
@@ -131,12 +131,16 @@ def symmetry(domain: dolfinx.mesh.Mesh, space: dolfinx.fem.FunctionSpace) -> lis
     return held
 
 
-SOLVERS = {"incompatible_modes": ours, "trilinear": lambda mesh: peer(mesh, 1), "quadratic": lambda mesh: peer(mesh, 2)}
+SOLVERS = {
+    "incompatible_modes": solve_by_program,
+    "trilinear": lambda mesh: solve_by_dolfinx(mesh, 1),
+    "quadratic": lambda mesh: solve_by_dolfinx(mesh, 2),
+}
 
 
-def solved(kind: str, cells: int, layers: int) -> dict:
+def solve_on_mesh(kind: str, cells: int, layers: int) -> dict:
     """Solve on a mesh; return warpage and costs."""
-    mesh = package(cells, layers)
+    mesh = mesh_package(cells, layers)
     begin = process_time()
     warpage_value, costs = SOLVERS[kind](mesh)
     seconds = process_time() - begin
@@ -150,15 +154,15 @@ def solved(kind: str, cells: int, layers: int) -> dict:
     }
 
 
-def meshes(quick: bool) -> list[dict]:
+def compare_meshes(quick: bool) -> list[dict]:
     """Compare element kinds on meshes of the package."""
     for kind in SOLVERS:
-        solved(kind, 5, 1)  # compiles
-    exact = solved("quadratic", *((11, 2) if quick else REFERENCE))
+        solve_on_mesh(kind, 5, 1)  # compiles
+    exact = solve_on_mesh("quadratic", *((11, 2) if quick else REFERENCE))
     rows = []
     for kind, sizes in MESHES.items():
         for cells, layers in sizes[: 3 if quick else None]:
-            row = solved(kind, cells, layers)
+            row = solve_on_mesh(kind, cells, layers)
             row["error"] = row["warpage_um"] / exact["warpage_um"] - 1.0
             print(
                 "{kind:>18} {cells:3} x {layers} {equations:7} equations {seconds:7.2f} s  {error:+.2e}".format(**row)
@@ -167,7 +171,7 @@ def meshes(quick: bool) -> list[dict]:
     return [*rows, exact]
 
 
-def boards(quick: bool) -> list[dict]:
+def compare_boards(quick: bool) -> list[dict]:
     """Compare boards of different mesh size."""
     case = read_case(CASE, ['warpage.corner="0 mm"', "board.numerics.layers=6"], oversubscribe=True)
     pads = pads_of(pad_table(case.package, case.board, case.warpage))
@@ -180,7 +184,7 @@ def boards(quick: bool) -> list[dict]:
             write = write_assembly if size else write_heated_assembly
             elements = sum(write(case.package, board, path).values())
             rows.append(
-                {"board": name, "elements": elements} | board_row(Assembly(path, pads, ELASTIC, Thermal(), 9.81))
+                {"board": name, "elements": elements} | measure_board(Assembly(path, pads, ELASTIC, Thermal(), 9.81))
             )
             print(
                 "{board:>32} {elements:7} elements {equations:7} equations {factor_mb:6.0f} MB".format(**rows[-1]),
@@ -198,7 +202,7 @@ def pads_of(sites: list) -> Pads:
     return Pads([site.name for site in sites], np.stack([lower, upper], axis=1), radii)
 
 
-def board_row(assembly: Assembly) -> dict:
+def measure_board(assembly: Assembly) -> dict:
     """Assemble and solve once with wrenches; return costs and the opening of the corner joint's gap."""
     begin = process_time()
     structure = ThermalStructure.build(MPI.COMM_SELF, assembly)
@@ -225,7 +229,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="fewer and smaller meshes")
     quick = parser.parse_args().quick
     print(f"PETSc {PETSc.Sys.getVersion()}, DOLFINx {dolfinx.__version__}, one core")
-    tables = {"meshes": meshes(quick), "boards": boards(quick)}
+    tables = {"meshes": compare_meshes(quick), "boards": compare_boards(quick)}
     results.write_figures(NAME, tables)
 
 

@@ -54,7 +54,7 @@ STRETCH = 2e-6  # [s] simulated by one side per turn
 ROUNDS = 7
 
 
-def runs_of(scene: DropScene, names: list[str]) -> dict[str, ProgramRun]:
+def make_runs(scene: DropScene, names: list[str]) -> dict[str, ProgramRun]:
     """Return the measured runs: settings, DNS, and the same DNS in implicit steps."""
     runs = {name: ProgramRun(scene.request("two_scale", SETTINGS[name], {})) for name in names}
     runs["dns"] = ProgramRun(scene.request("dns", {}, {}))
@@ -64,14 +64,14 @@ def runs_of(scene: DropScene, names: list[str]) -> dict[str, ProgramRun]:
 
 def cost_table(scene: DropScene, names: list[str]) -> dict:
     """Return the cost of each setting over the DNS, from processor seconds in turns."""
-    runs = runs_of(scene, names)
+    runs = make_runs(scene, names)
     for run in runs.values():
         run.step(STRETCH)
-    seconds = turns.in_turns({name: lambda run=run: run.step(STRETCH) for name, run in runs.items()}, ROUNDS)
-    print({name: f"{turns.ratio(seconds, 'dns', name):.3f}" for name in runs}, flush=True)
+    seconds = turns.measure_in_turns({name: lambda run=run: run.step(STRETCH) for name, run in runs.items()}, ROUNDS)
+    print({name: f"{turns.speed_ratio(seconds, 'dns', name):.3f}" for name in runs}, flush=True)
     return {
         name: {
-            "time_ratio": turns.ratio(seconds, "dns", name),
+            "time_ratio": turns.speed_ratio(seconds, "dns", name),
             "seconds_per_simulated_us": 1e-6 * float(np.median(seconds[name])),
             "setup_seconds": run.setup,
             "whole_case_seconds": run.setup + longest_duration(scene.case) * float(np.median(seconds[name])),
@@ -92,23 +92,23 @@ def error_table(scene: DropScene, names: list[str], shock: dict, folder: Path) -
         run = ProgramRun(scene.request("two_scale", SETTINGS[name], shock))
         if run.plan.window not in references:
             whole = SETTINGS[name] | {"fine_joints": "all"}
-            path, seconds = history_of(ProgramRun(scene.request("dns", whole, shock)), folder / f"dns_of_{name}.npz")
+            path, seconds = write_history(ProgramRun(scene.request("dns", whole, shock)), folder / f"dns_of_{name}.npz")
             references[run.plan.window], rows[path.stem] = path, {"seconds": seconds}
-        path, seconds = history_of(run, folder / f"{name}.npz")
+        path, seconds = write_history(run, folder / f"{name}.npz")
         errors = compare_histories(path, references[run.plan.window], SETTINGS[name].get("fine_joints"))
         rows[name] = errors | {"seconds": seconds}
         print(name, rows[name], flush=True)
     return rows
 
 
-def history_of(run: ProgramRun, path: Path) -> tuple[Path, float]:
+def write_history(run: ProgramRun, path: Path) -> tuple[Path, float]:
     """Complete a run and write its history; return path and processor seconds."""
     arrays, seconds = run.to_end()
     np.savez(path, **arrays)
     return path, seconds
 
 
-def bars_of(costs: dict[str, dict], errors: dict) -> dict:
+def judge(costs: dict[str, dict], errors: dict) -> dict:
     """Return the limits with their measured values."""
     bars = {}
     for name in set(BARS) & set(errors):
@@ -139,7 +139,7 @@ def main() -> None:
         errors = error_table(short, names, shock, folders["histories"])
     result = {"size": "full" if options.full else "reduced", "costs": costs, "errors": errors}
     name = "two_scale_full" if options.full else "two_scale"
-    results.write_and_print(name, result | {"bars": bars_of(costs, errors)})
+    results.write_and_print(name, result | {"bars": judge(costs, errors)})
 
 
 if __name__ == "__main__":

@@ -36,7 +36,7 @@ SHOCK = {"pulse_duration": 2e-5, "duration": 6e-5, "history_samples": 100}
 ERRORS = ("critical_joint_stress_error", "die_displacement_error", "board_strain_error")
 
 
-def row(name: str, scene: DropScene, fraction: float, folder: Path) -> dict:
+def run_setting(name: str, scene: DropScene, fraction: float, folder: Path) -> dict:
     """Run a setting or ``dns``; return sizes, seconds and errors against the DNS of the same fraction."""
     mode, coupling = ("dns", {}) if name == "dns" else ("two_scale", SETTINGS[name])
     run = ProgramRun(scene.request(mode, coupling, SHOCK | {"step_fraction": fraction}))
@@ -56,7 +56,7 @@ def row(name: str, scene: DropScene, fraction: float, folder: Path) -> dict:
     }
 
 
-def table_row(item: dict) -> str:
+def format_row(item: dict) -> str:
     """Format a row of the table."""
     errors = " | ".join(f"{100.0 * item[metric]:.3f}" for metric in ERRORS)
     return (
@@ -65,7 +65,7 @@ def table_row(item: dict) -> str:
     )
 
 
-def orders(rows: list[dict]) -> dict[str, dict[str, float]]:
+def fit_orders(rows: list[dict]) -> dict[str, dict[str, float]]:
     """Return the fitted order in the window of each setting and metric."""
     fitted_orders: dict[str, dict[str, float]] = {}
     for name in dict.fromkeys(item["setting"] for item in rows):
@@ -86,13 +86,13 @@ def main() -> None:
         folder = Path(directory)
         scene = DropScene.write(folder, SMALL)
         for fraction in fractions:
-            dns = row("dns", scene, fraction, folder)
+            dns = run_setting("dns", scene, fraction, folder)
             for name in SETTINGS:
-                item = row(name, scene, fraction, folder)
+                item = run_setting(name, scene, fraction, folder)
                 item["time_ratio"] = item["seconds"] / dns["seconds"]
                 rows.append(item)
-                print(table_row(item), flush=True)
-    results.write_and_print("two_scale_accuracy", {"rows": rows, "orders": orders(rows)})
+                print(format_row(item), flush=True)
+    results.write_and_print("two_scale_accuracy", {"rows": rows, "orders": fit_orders(rows)})
 
 
 if __name__ == "__main__":

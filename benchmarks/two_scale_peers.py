@@ -126,12 +126,12 @@ def material_text(part: str, materials: Materials) -> str:
     return "\n".join([f"material elastic [\n name = {part}", *(f" {key} = {values[key]:.17g}" for key in values), "]"])
 
 
-def centres(arrays: dict[str, np.ndarray]) -> np.ndarray:
+def heights_of_centres(arrays: dict[str, np.ndarray]) -> np.ndarray:
     """Return the heights of board and die [m], shape (samples, 2), from a history."""
     return np.column_stack([arrays["board_centre"][:, 2], arrays["die_centre"][:, 2]])
 
 
-def compared(scene: Scene) -> tuple[dict, dict]:
+def compare_with_peer(scene: Scene) -> tuple[dict, dict]:
     """Return limits and figures of a scene."""
     with tempfile.TemporaryDirectory() as directory:
         path, fine = Path(directory) / "package.msh", Path(directory) / "fine.msh"
@@ -140,12 +140,12 @@ def compared(scene: Scene) -> tuple[dict, dict]:
         exact = ProgramRun(scene.request("dns", fine)).to_end()[0]
         runs = {mode: ProgramRun(scene.request(mode, path)) for mode in MODES}
         plan, histories = runs["dns"].plan, {mode: run.to_end()[0] for mode, run in runs.items()}
-        reference = CubicSpline(exact["time"], centres(exact))(histories["dns"]["time"])
-        heights = {mode: centres(arrays) for mode, arrays in histories.items()}
+        reference = CubicSpline(exact["time"], heights_of_centres(exact))(histories["dns"]["time"])
+        heights = {mode: heights_of_centres(arrays) for mode, arrays in histories.items()}
         peer = Peer(f"{scene.peer}_shock", scene.problem(path, runs["dns"]))
         heights[scene.peer] = peer.force
         batches = {mode: lambda run=run: run.step(STRETCH) for mode, run in runs.items()}
-        seconds = turns.in_turns(batches | {scene.peer: lambda: peer.ask("step") / plan.step})
+        seconds = turns.measure_in_turns(batches | {scene.peer: lambda: peer.ask("step") / plan.step})
         peer.end()
     errors = {name: relative_error(values, reference) for name, values in heights.items()}
     rest = {
@@ -156,7 +156,7 @@ def compared(scene: Scene) -> tuple[dict, dict]:
         "difference_of_peer_and_dns": relative_error(heights[scene.peer], heights["dns"]),
         "largest_plastic_strain": float(histories["dns"].get("plastic_strain_max", np.zeros(1)).max()),
     }
-    bars = {f"{mode} / {scene.peer}": turns.bar(turns.ratio(seconds, mode, scene.peer), BAR) for mode in MODES}
+    bars = {f"{mode} / {scene.peer}": turns.bar(turns.speed_ratio(seconds, mode, scene.peer), BAR) for mode in MODES}
     share = errors["two_scale"] / errors[scene.peer]
     return bars | {f"two_scale error / {scene.peer} error": turns.bar(share, 1.0, at_least=False)}, rest
 
@@ -166,7 +166,7 @@ def main() -> None:
     installed, result = install(), {"bars": {}}
     for name, scene in SCENES.items():
         if scene.peer in installed:
-            bars, result[name] = compared(scene)
+            bars, result[name] = compare_with_peer(scene)
             result["bars"] |= bars
     if not result["bars"]:
         raise SystemExit("no peer can be installed; the benchmark needs one of them")

@@ -7,9 +7,9 @@ def main() -> None:
     """Prepare the process, then load and run the command line."""
     with one_line_errors():
         handle_signals()
-        from reflowshock.workflow.process.environment import begin_again_in_utf8, prepare
+        from reflowshock.workflow.process.environment import prepare, restart_in_utf8
 
-        begin_again_in_utf8()
+        restart_in_utf8()
         prepare()  # before any library is loaded
         from reflowshock.workflow.cli import main as run_command_line
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rich.console import Console
 
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 from reflowshock.notebook import Metrics, ReportView, case_html, plan_html, run_html
 from reflowshock.problem import as_toml
 from reflowshock.workflow import plan
@@ -58,10 +58,10 @@ class Plan:
     """Plan of a run; its text is the output of ``reflowshock plan``.
 
     Attributes:
-        stages: planned actions by stage, in order.
-        effects: decisions by effect: "on", "why" and, if predicted, "influence" on the results.
-        text: plan as text.
-        compilation: predicted wall time for compiling kernels in a first run [s].
+        stages: Planned actions by stage, in order.
+        effects: Decisions by effect: "on", "why" and, if predicted, "influence" on the results.
+        text: Plan as text.
+        compilation: Predicted wall time for compiling kernels in a first run [s].
     """
 
     stages: Mapping[str, PlannedStage]
@@ -86,9 +86,9 @@ class Case:
     """Checked case file with settings.
 
     Attributes:
-        path: path of the case file.
+        path: Path of the case file.
         settings: "dotted.key=value" settings that override the file.
-        resolved: case with every value in SI units.
+        resolved: Case with every value in SI units.
     """
 
     path: Path
@@ -101,10 +101,10 @@ class Case:
 
         Args:
             path: TOML file.
-            overrides: values with units by dotted key, e.g. ``{"shock.duration": "2 ms"}``, or "dotted.key=value".
+            overrides: Values with units by dotted key, e.g. ``{"shock.duration": "2 ms"}``, or "dotted.key=value".
 
         Raises:
-            CaseError: with all problems, their positions in the file, allowed values and nearest valid names.
+            CaseError: With all problems, their positions in the file, allowed values and nearest valid names.
         """
         pairs = overrides.items() if isinstance(overrides, Mapping) else ()
         settings = tuple(f"{key}={_toml(value)}" for key, value in pairs) or tuple(overrides)
@@ -130,16 +130,16 @@ class Case:
         """Run all missing, stale and damaged stages in a subprocess, like ``reflowshock run``.
 
         Args:
-            out: run folder; None for ``runs/<name of the case>``.
-            until: last stage to run.
-            cores: number of cores; None for all.
-            force: whether to accept a folder with another case, and implausible values.
+            out: Run folder; None for ``runs/<name of the case>``.
+            until: Last stage to run.
+            cores: Number of cores; None for all.
+            force: Whether to accept a folder with another case, and implausible values.
 
         Returns:
             The run, even if a health check failed: see ``Run.is_healthy``.
 
         Raises:
-            RunFailed: a stage failed, or the command could not start.
+            RunFailed: A stage failed, or the command could not start.
         """
         store = self._store(out)
         options = ["--out", str(store.folder), "--until", until, "--yes"]
@@ -164,8 +164,8 @@ class Run:
     """Results in a run folder.
 
     Attributes:
-        folder: run folder.
-        case: case of the run with every value in SI units.
+        folder: Run folder.
+        case: Case of the run with every value in SI units.
     """
 
     folder: Path
@@ -176,8 +176,8 @@ class Run:
         """Open a run folder.
 
         Raises:
-            UnknownName: the folder is not a run folder; the message contains the nearest run folder.
-            CaseError: the folder has no case, or its case is damaged.
+            UnknownName: The folder is not a run folder; the message contains the nearest run folder.
+            CaseError: The folder has no case, or its case is damaged.
         """
         folder = Path(folder)
         mark = read_mark(folder)
@@ -238,7 +238,7 @@ class Run:
         """Return the closed surface of a joint in its own frame [m]; cell data "boundary": 0 free, 1 board, 2 package.
 
         Raises:
-            UnknownName: no surface of this joint exists; the message contains the nearest name.
+            UnknownName: No surface of this joint exists; the message contains the nearest name.
         """
         path = self.folder / "surface" / f"{joint}.vtu"
         names = sorted(file.stem for file in path.parent.glob("*.vtu"))
@@ -267,7 +267,7 @@ class Run:
 
 def _hint(name: str, names: Sequence[str]) -> str:
     """Return a hint with the nearest name, or an empty string without names."""
-    return f"; did you mean {nearest(name, names) or names[0]}?" if names else ""
+    return f"; did you mean {find_nearest(name, names) or names[0]}?" if names else ""
 
 
 def _is_scalar(value: object) -> bool:

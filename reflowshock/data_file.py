@@ -31,12 +31,13 @@ def write_data(path: Path, header: Mapping[str, Any], value: object) -> None:
     """Write a value to a file atomically: after a kill, either the old or the new file exists.
 
     Args:
-        path: path of the file; a missing folder is created.
-        header: header, which ``read_header`` returns.
-        value: arrays, numbers, text, paths and None, in dicts with names as keys, lists, tuples and records.
+        path: Path of the file; a missing folder is created.
+        header: Plain data for JSON, one line at the start of the file that ``read_header`` returns.
+        value: Arrays, numbers, text, paths and None, in dicts with names as keys, lists, tuples and records
+            (dataclasses and pydantic models).
 
     Raises:
-        TypeError: a part of the value has an unsupported type; the message names it.
+        TypeError: A part of the value has an unsupported type; the message names it.
     """
     packing = _Packing()
     tree = np.frombuffer(json.dumps(packing.put(value, "value")).encode(), np.uint8)
@@ -45,14 +46,14 @@ def write_data(path: Path, header: Mapping[str, Any], value: object) -> None:
     line, data = json.dumps(dict(header)).encode() + b"\n", archive.getbuffer()
     digest = hashlib.sha256(line)
     digest.update(data)
-    write_at_once(path, FORMAT, digest.hexdigest().encode(), b"\n", line, data)
+    write_atomically(path, FORMAT, digest.hexdigest().encode(), b"\n", line, data)
 
 
 def read_header(path: Path) -> dict[str, Any]:
     """Return the header of a file without reading the rest.
 
     Raises:
-        NotData: the file has no valid header.
+        NotData: The file has no valid header.
     """
     try:
         with path.open("rb") as file:
@@ -69,11 +70,11 @@ def read_data(path: Path, records: Collection[type] = ()) -> Any:
     """Return the value in a file.
 
     Args:
-        path: file that `write_data` has written.
-        records: dataclasses and pydantic models that may be in it.
+        path: File that ``write_data`` has written.
+        records: Dataclasses and pydantic models that may be in it.
 
     Raises:
-        NotData: the file was modified, or contains records of other types.
+        NotData: The file was modified, or contains records of other types.
     """
     archive = _checked(path)
     try:
@@ -91,15 +92,20 @@ def _checked(path: Path) -> memoryview:
         content = path.read_bytes()
     except OSError as error:
         raise NotData(f"{path} cannot be read: {error}") from error
-    begin = content.find(b"\n") + 1
-    rest = memoryview(content)[begin:]
-    if content[:begin] != FORMAT + hashlib.sha256(rest).hexdigest().encode() + b"\n":
+    start = content.find(b"\n") + 1
+    rest = memoryview(content)[start:]
+    if content[:start] != FORMAT + hashlib.sha256(rest).hexdigest().encode() + b"\n":
         raise NotData(f"{path} is truncated, modified or of another format")
-    return rest[content.find(b"\n", begin) + 1 - begin :]
+    return rest[content.find(b"\n", start) + 1 - start :]
 
 
-def write_at_once(path: Path, *content: bytes | memoryview) -> None:
-    """Replace a file atomically: after a kill, either the old or the new file exists."""
+def write_atomically(path: Path, *content: bytes | memoryview) -> None:
+    """Replace a file atomically: after a kill, either the old or the new file exists.
+
+    Args:
+        path: Path of the file; a missing folder is created.
+        content: Parts of the contents, written one after the other.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(f"{path.name}.{os.getpid()}.partial")
     with partial.open("wb") as file:
@@ -115,18 +121,22 @@ def write_at_once(path: Path, *content: bytes | memoryview) -> None:
 
 
 def columns(rows: Sequence[Mapping[str, Any]]) -> dict[str, NDArray]:
-    """Return rows with equal keys as one array per key, which is written faster."""
+    """Return rows with equal keys as a table: key -> values of all rows, shape (k, ...), which is written faster.
+
+    Args:
+        rows: Rows, each key -> number, text or array of equal shape; the table of no rows is empty.
+    """
     return {name: np.array([row[name] for row in rows]) for name in rows[0]} if rows else {}
 
 
 def rows(table: Mapping[str, NDArray]) -> list[dict[str, Any]]:
-    """Return the rows of a table made by ``columns``."""
+    """Return the rows of a table made by ``columns``, each key -> plain value; arrays stay arrays."""
     parts = [column.tolist() if column.ndim == 1 else list(column) for column in table.values()]
     return [dict(zip(table, row, strict=True)) for row in zip(*parts, strict=True)]
 
 
 def fields_of(record: object) -> dict[str, Any]:
-    """Return the fields of a dataclass or pydantic model by name."""
+    """Return the fields of a dataclass or pydantic model by name; raise TypeError for other objects."""
     if is_dataclass(record):
         return {field.name: getattr(record, field.name) for field in fields(record)}
     if hasattr(record, "model_dump"):
@@ -142,7 +152,7 @@ class _Packing:
     """Collector of the arrays in a value; repeated arrays are stored once.
 
     Attributes:
-        arrays: arrays by name.
+        arrays: Arrays by name.
     """
 
     def __init__(self) -> None:
@@ -169,9 +179,9 @@ class _Packing:
         return {KIND: _name_of(type(value)), "fields": self._put_items(fields_of(value), location)}
 
     def _put_items(self, items: Mapping[str, Any], location: str) -> dict[str, Any]:
-        odd = [key for key in items if not isinstance(key, str) or key == KIND]
-        if odd:
-            raise TypeError(f"{location}: {odd[0]!r} is not a valid name")
+        invalid = [key for key in items if not isinstance(key, str) or key == KIND]
+        if invalid:
+            raise TypeError(f"{location}: {invalid[0]!r} is not a valid name")
         return {key: self.put(value, f"{location}/{key}") for key, value in items.items()}
 
     def _put_array(self, array: NDArray, location: str) -> str:

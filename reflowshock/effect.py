@@ -5,11 +5,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, NotRequired, TypedDict, TypeVar
 
-from reflowshock.parameters import changed
+from reflowshock.parameters import with_value
 
 Switch = Literal["auto", "on", "off"]
 Scene = TypeVar("Scene", contravariant=True)
-GIVEN = "none: the case says it"
+SET_IN_CASE = "none: set in the case file"
 
 
 class Decision(TypedDict):
@@ -21,7 +21,16 @@ class Decision(TypedDict):
 
 
 def decision(on: bool, why: str, influence: float | None = None) -> Decision:
-    """Return a decision as a plain dictionary for plans and results."""
+    """Return a decision as a plain dictionary for plans and results.
+
+    Args:
+        on: Whether the effect acts.
+        why: Reason in words.
+        influence: Expected relative change of the result by the effect; None, if it is not predicted, omits the key.
+
+    Returns:
+        Dictionary with the keys ``on``, ``why`` and, if predicted, ``influence``.
+    """
     result: Decision = {"on": bool(on), "why": why}
     if influence is not None:
         result["influence"] = float(influence)
@@ -57,7 +66,7 @@ class Effect(ABC, Generic[Scene]):
     name: str
     stage: str = "shock"
     adds: str = ""
-    number: str = GIVEN
+    number: str = SET_IN_CASE
     influence: str = ""
     implementation: str = ""
     switch: str = ""
@@ -70,13 +79,21 @@ class Effect(ABC, Generic[Scene]):
     def decide(self, scene: Scene) -> Decision:
         """Decide whether the effect acts in a scene."""
 
-    def other_way(self, case: Any, acts: bool) -> Any | None:
+    def toggled(self, case: Any, acts: bool) -> Any | None:
         """Return the case with the effect toggled, or None if its cost cannot be predicted."""
         if self.toggle is None:
             return None
-        return changed(case, self.toggle.key, self.toggle.off if acts else self.toggle.on)
+        return with_value(case, self.toggle.key, self.toggle.off if acts else self.toggle.on)
 
 
-def decided(effects: Iterable[Effect[Scene]], scene: Scene) -> dict[str, Decision]:
-    """Return the decisions on a list of effects, by name."""
+def decide_all(effects: Iterable[Effect[Scene]], scene: Scene) -> dict[str, Decision]:
+    """Return the decision on each effect in a scene.
+
+    Args:
+        effects: Effects to decide on.
+        scene: Parameters that the ``decide`` of these effects takes.
+
+    Returns:
+        Effect name -> decision (state, reason and expected influence), in the given order.
+    """
     return {effect.name: effect.decide(scene) for effect in effects}

@@ -38,7 +38,7 @@ class ModuleCacheLocator:
     """Cache locator for the kernels of this program, with the interface of Numba's own locators."""
 
     def __init__(self, function: Callable, file: str) -> None:
-        """Take a kernel and its source."""
+        """Store a kernel and the path of its source file."""
         self._function, self._py_file = function, file  # Numba reads this name in its error messages
 
     @classmethod
@@ -78,23 +78,26 @@ class _ImportHook:
         if spec is not None and spec.loader is not None:
             execute = spec.loader.exec_module
 
-            def execute_and_put_first(module: ModuleType) -> None:
+            def execute_and_insert(module: ModuleType) -> None:
                 execute(module)
                 _insert_locator(module)
 
-            spec.loader.exec_module = execute_and_put_first  # type: ignore[method-assign]
+            spec.loader.exec_module = execute_and_insert  # type: ignore[method-assign]
         return spec
 
 
 def _insert_locator(caching: ModuleType) -> None:
-    cache_type = getattr(caching, "CacheImpl", None) or caching._CacheImpl  # its name has changed
+    cache_type = getattr(caching, "CacheImpl", None) or caching._CacheImpl  # renamed in recent versions
     classes = cache_type._locator_classes
     if _has_locator_classes(_compiler()) and ModuleCacheLocator not in classes:
         classes.insert(0, ModuleCacheLocator)
 
 
 def source_cache(folder: Path) -> Path:
-    """Return the subfolder of a kernel cache for the present sources and version of Numba."""
+    """Return the subfolder of a kernel cache for the present sources and version of Numba; the folder is not created.
+
+    Versions of Numba without locators that can be replaced use ``folder`` itself.
+    """
     version = _compiler()
     return folder / f"numba-{version}" / digest() if _has_locator_classes(version) else folder
 
@@ -123,7 +126,7 @@ def _is_ready(folder: str) -> bool:
 
 
 def ensure_writable(folder: Path) -> bool:
-    """Create a folder if necessary and return whether files can be written in it."""
+    """Create a folder if necessary and return whether files can be written in it; errors give False."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):

@@ -16,7 +16,7 @@ class ReportView:
     """Report for a notebook, including its 3D view, in a sandboxed frame.
 
     Attributes:
-        path: path of ``report.html``.
+        path: Path of ``report.html``.
     """
 
     path: Path
@@ -36,12 +36,25 @@ class Metrics(dict):
 
 
 def case_html(name: str, title: str, values: Mapping[str, Any]) -> str:
-    """Return the HTML of a case: title and folded table of all parameters."""
-    return heading(name, title) + folded(f"{len(values)} parameters", table(("key", "value"), values.items()), False)
+    """Return the HTML of a case: title and folded table of all parameters.
+
+    Args:
+        name: Name of the case.
+        title: Title of the case; may be empty.
+        values: Dotted key -> value as shown in the table.
+    """
+    return heading(name, title) + fold(f"{len(values)} parameters", table(("key", "value"), values.items()), False)
 
 
 def plan_html(stages: Mapping[str, Any], effects: Mapping[str, Mapping[str, Any]], seconds: float) -> str:
-    """Return the HTML of a plan: actions and costs of stages, and active effects."""
+    """Return the HTML of a plan: actions and costs of stages, and active effects.
+
+    Args:
+        stages: Stage name -> planned stage, with the attributes ``runs`` (bool), ``seconds`` (predicted duration) and
+            ``why`` (reason).
+        effects: Effect name -> decision, with the keys ``on`` and ``why``.
+        seconds: Predicted duration of all stages [s]; 0 if unknown.
+    """
     from reflowshock.workflow.case.text import duration
 
     rows = [
@@ -53,20 +66,20 @@ def plan_html(stages: Mapping[str, Any], effects: Mapping[str, Mapping[str, Any]
     rows.append(("all", "", duration(seconds) if seconds else "", "on an otherwise idle machine"))
     acting = [(_words(name), "on" if decision["on"] else "off", decision["why"]) for name, decision in effects.items()]
     stage_table = table(("stage", "", "predicted", "why"), rows)
-    return stage_table + folded(f"{len(acting)} effects", table(("effect", "", "why"), acting), False)
+    return stage_table + fold(f"{len(acting)} effects", table(("effect", "", "why"), acting), False)
 
 
 def run_html(summary: Mapping[str, Any], title: str, picture: bytes | None) -> str:
     """Return the HTML of a run: answer, health checks, picture of the meshes and metrics.
 
     Args:
-        summary: contents of ``summary.json``.
-        title: title of the case.
-        picture: PNG data, or None.
+        summary: Contents of ``summary.json``; the keys ``case``, ``answer``, ``health`` and ``metrics`` are used.
+        title: Title of the case.
+        picture: PNG data, or None for a page without a picture.
     """
-    missed = [_words(name) for name, check in summary["health"].items() if not check["ok"]]
-    held = f"all {len(summary['health'])} health checks passed"
-    health = f"health checks failed: {', '.join(missed)}" if missed else held
+    failed = [_words(name) for name, check in summary["health"].items() if not check["ok"]]
+    passed = f"all {len(summary['health'])} health checks passed"
+    health = f"health checks failed: {', '.join(failed)}" if failed else passed
     parts = [heading(summary["case"], title), _paragraph(summary.get("answer", "")), _paragraph(health)]
     if picture is not None:
         encoded = base64.b64encode(picture).decode()
@@ -75,19 +88,30 @@ def run_html(summary: Mapping[str, Any], title: str, picture: bytes | None) -> s
 
 
 def heading(name: str, title: str) -> str:
-    """Return the HTML of name and title of a case."""
+    """Return the HTML of name and title of a case, escaped."""
     return f"<p><b>{escape(name)}</b> {escape(title)}</p>"
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Return the HTML of a table of texts."""
+    """Return an HTML table of texts, which are escaped.
+
+    Args:
+        head: Titles of the columns.
+        rows: Cells of each row; other objects are shown by ``str``.
+    """
     cells = "".join(f"<tr>{''.join(f'<td>{escape(str(cell))}</td>' for cell in row)}</tr>" for row in rows)
     titles = "".join(f"<th>{escape(title)}</th>" for title in head)
     return f"<table><thead><tr>{titles}</tr></thead><tbody>{cells}</tbody></table>"
 
 
-def folded(title: str, inside: str, opened: bool = True) -> str:
-    """Return the HTML of a collapsible section."""
+def fold(title: str, inside: str, opened: bool = True) -> str:
+    """Return the HTML of a collapsible section.
+
+    Args:
+        title: Title, always visible; it is escaped.
+        inside: HTML of the contents.
+        opened: Whether the section is open at first.
+    """
     return f"<details{' open' if opened else ''}><summary>{escape(title)}</summary>{inside}</details>"
 
 
@@ -96,7 +120,7 @@ def _metrics(records: Mapping[str, dict]) -> str:
     from reflowshock.workflow.report.tables import named_quantity
 
     rows = [(_words(name), named_quantity(dict(records), name)) for name in records]
-    return folded(f"{len(rows)} metrics", table(("", "value"), rows), len(rows) <= FIRST)
+    return fold(f"{len(rows)} metrics", table(("", "value"), rows), len(rows) <= FIRST)
 
 
 def _paragraph(text: str) -> str:

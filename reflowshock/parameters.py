@@ -11,7 +11,13 @@ class Parameters(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-def changed(model: BaseModel, key: str, value: object) -> Any:
-    """Return a copy of a model with another value at a dotted key, without validation."""
+def with_value(model: BaseModel, key: str, value: object) -> Any:
+    """Return a copy of a model with another value at a dotted key, without validation.
+
+    Args:
+        model: Parameters; not changed.
+        key: Dotted names of attributes, e.g. "solder.numerics.spacing".
+        value: New value, in SI units.
+    """
     name, _, rest = key.partition(".")
-    return model.model_copy(update={name: changed(getattr(model, name), rest, value) if rest else value})
+    return model.model_copy(update={name: with_value(getattr(model, name), rest, value) if rest else value})

@@ -4,7 +4,7 @@ import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 
 LONGEST = 120  # maximum length of a value or key in a message
 
@@ -14,13 +14,13 @@ class Problem:
     """Input error in a case file or on the command line.
 
     Attributes:
-        key: dotted key, e.g. "package.pitch"; empty for errors of the whole file.
-        message: description of the error.
-        value: value as written by the user; None for a missing value.
-        allowed: allowed range or dimension, or empty.
-        hint: nearest valid name, or empty.
-        line: line of the key in its file, counted from 1; None if unknown.
-        column: column of the key, counted from 1; None if unknown.
+        key: Dotted key, e.g. "package.pitch"; empty for errors of the whole file.
+        message: Description of the error.
+        value: Value as written by the user; None for a missing value.
+        allowed: Allowed range or dimension, or empty.
+        hint: Nearest valid name, or empty.
+        line: Line of the key in its file, counted from 1; None if unknown.
+        column: Column of the key, counted from 1; None if unknown.
     """
 
     key: str
@@ -32,8 +32,8 @@ class Problem:
     column: int | None = None
 
     def __str__(self) -> str:
-        key = shortened(self.key)
-        location = key if self.value is None else f"{key} = {shortened(as_toml(self.value))}"
+        key = shorten(self.key)
+        location = key if self.value is None else f"{key} = {shorten(as_toml(self.value))}"
         parts = [": ".join(part for part in (location, self.message) if part)]
         if self.allowed:
             parts.append(f"allowed: {self.allowed}")
@@ -48,10 +48,17 @@ class Problem:
 
 
 def unknown_name(key: str, name: str, valid: Iterable[str], what: str) -> Iterator[Problem]:
-    """Yield a problem where a name is not among the valid ones."""
+    """Yield a problem with the nearest valid name as hint if a name is unknown; yield nothing otherwise.
+
+    Args:
+        key: Dotted key of the problem.
+        name: Name to check.
+        valid: Valid names.
+        what: Kind of the name for the message, e.g. "joint".
+    """
     names = list(valid)
     if name not in names:
-        yield Problem(key, f"no such {what}", name, "one of " + ", ".join(names), nearest(name, names))
+        yield Problem(key, f"no such {what}", name, "one of " + ", ".join(names), find_nearest(name, names))
 
 
 def as_toml(value: object) -> str:
@@ -69,7 +76,7 @@ def as_toml(value: object) -> str:
     return str(value)
 
 
-def shortened(text: str) -> str:
+def shorten(text: str) -> str:
     """Return a text cut to at most ``LONGEST`` characters."""
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"
 

@@ -36,7 +36,7 @@ class ProcessPool(ProcessPoolExecutor):
 
     def ending(self) -> str:
         """Describe how the processes of a broken pool ended."""
-        processes = self._own()
+        processes = self._worker_processes()
         self.shutdown()  # its thread reaps the processes; a second wait could miss the exit code
         # The pool itself terminates the remaining processes with SIGTERM.
         code = next((process.exitcode for process in processes if process.exitcode not in (0, -signal.SIGTERM)), None)
@@ -44,10 +44,10 @@ class ProcessPool(ProcessPoolExecutor):
         return f"exit code {code}{killed}"
 
     def _kill(self) -> None:
-        for process in self._own():
+        for process in self._worker_processes():
             process.kill()
 
-    def _own(self) -> list[Any]:
+    def _worker_processes(self) -> list[Any]:
         """Return the processes, which have no public interface before Python 3.14 (``kill_workers``)."""
         return list((self._processes or {}).values())
 

@@ -16,7 +16,7 @@ class Quantity:
     Models store SI floats and validate their ranges. A case file may use any unit of the same dimension.
 
     Attributes:
-        unit: unit for displaying values, e.g. "mm".
+        unit: Unit for displaying values, e.g. "mm".
     """
 
     unit: str

@@ -51,15 +51,15 @@ def to_si(text: object, unit: str) -> float:
     """Convert a quantity to its SI value.
 
     Args:
-        text: a number and a unit, e.g. "0.48 mm".
-        unit: any unit of the expected dimension, e.g. "m".
+        text: A number and a unit, e.g. "0.48 mm".
+        unit: Any unit of the expected dimension, e.g. "m".
 
     Returns:
         The float nearest to the value in SI base units (rad for angles, K for temperatures and for differences, e.g.
         "5 delta_degC").
 
     Raises:
-        UnitError: not a string, no number, no unit, unknown unit or another dimension.
+        UnitError: Not a string, no number, no unit, unknown unit or another dimension.
     """
     if not isinstance(text, str):
         raise UnitError(f'needs a unit, as a string such as "{_plain(text)} {unit}"')
@@ -87,12 +87,18 @@ def quantity_in_si(value: float, unit: str) -> float:
 
 
 def from_si(value: float, unit: str, digits: int = 10) -> str:
-    """Return an SI value as text in a unit, e.g. ``from_si(4.8e-4, "mm")`` is "0.48 mm"."""
+    """Return an SI value as text in a unit, e.g. ``from_si(4.8e-4, "mm")`` is "0.48 mm".
+
+    Args:
+        value: Value in SI base units.
+        unit: Unit of the text.
+        digits: Number of significant digits.
+    """
     return f"{in_unit(value, unit):.{digits}g} {unit}"
 
 
 def in_unit(value: float, unit: str) -> float:
-    """Return the magnitude of an SI value in a unit."""
+    """Return the magnitude of an SI value in a unit, e.g. 0.48 for 4.8e-4 in "mm"; inf and nan do not change."""
     if not math.isfinite(value):
         return value
     parsed, base = _with_its_base(unit)

@@ -342,11 +342,11 @@ def stage(
     """Make one product in the store in the working directory (called by Snakemake)."""
     from reflowshock.workflow.case.run import Run
     from reflowshock.workflow.pipeline.stage_runner import execute
-    from reflowshock.workflow.process.progress_file import tell_in
+    from reflowshock.workflow.process.progress_file import write_progress_to
     from reflowshock.workflow.stages import stage_function
 
     product, folder = Path("products", f"{name}-{key}"), Path("work", f"{name}-{key}")
-    tell_in(folder)
+    write_progress_to(folder)
     run = Run(folder, read_case_of_run(folder), cores, oversubscribe)
     if not execute(name, stage_function(run.case, name), run, product):
         raise typer.Exit(1)

@@ -11,7 +11,7 @@ from rich.console import RenderableType
 from reflowshock.effect import Effect
 from reflowshock.fem.estimates.structure_effects import STRUCTURE_EFFECTS
 from reflowshock.fem.estimates.thermal_effects import HEATED_EFFECTS
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 from reflowshock.particles.parameters.effects import LIQUID_EFFECTS
 from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import problems as package_checks
@@ -65,17 +65,17 @@ class Kind:
     """Kind of case.
 
     Attributes:
-        case: model of its case files.
-        problems: check for combinations of parameters that are impossible.
-        stages: functions of the stages except the report, by name, in order.
-        forecast: prediction of effects and cost from the parameters.
-        size: prediction of time and memory of the stages.
-        plan: further tables of the plan, from a case and its forecast.
-        acts: subject of its effects in headings.
-        report: function that adds sections to the context of a report: run folder, case, context, summary.
-        study: convergence study of a case.
-        effects: effects that may act.
-        conclude: function that adds conclusions to a summary: run folder, case, summary, discretisation errors.
+        case: Model of its case files.
+        problems: Check for combinations of parameters that are impossible.
+        stages: Functions of the stages except the report, by name, in order.
+        forecast: Prediction of effects and cost from the parameters.
+        size: Prediction of time and memory of the stages.
+        plan: Further tables of the plan, from a case and its forecast.
+        acts: Subject of its effects in headings.
+        report: Function that adds sections to the context of a report: run folder, case, context, summary.
+        study: Convergence study of a case.
+        effects: Effects that may act.
+        conclude: Function that adds conclusions to a summary: run folder, case, summary, discretisation errors.
     """
 
     case: type[Case]
@@ -284,10 +284,10 @@ def kind_named_in(table: Mapping) -> Kind:
     """Return the kind of a case file.
 
     Raises:
-        CaseError: the file has the table of no kind, or of several.
+        CaseError: The file has the table of no kind, or of several.
     """
     names = [name for name in NAMES if name in table]
-    if names == [PACKAGE.name] and not any(nearest(name, ("shock",)) for name in table):
+    if names == [PACKAGE.name] and not any(find_nearest(name, ("shock",)) for name in table):
         return PACKAGE
     if len(names) == 1:
         return next(kind for kind in KINDS if kind.name == names[0])
@@ -297,7 +297,7 @@ def kind_named_in(table: Mapping) -> Kind:
         raise CaseError("case", [Problem("", message, None, choice)])
     if isinstance(table.get("study"), dict):
         raise CaseError("case", [Problem("", "is a study, not a case; use reflowshock study")])
-    hint = next((f"[{near}]" for name in table if (near := nearest(name, NAMES))), "")
+    hint = next((f"[{near}]" for name in table if (near := find_nearest(name, NAMES))), "")
     raise CaseError("case", [Problem("", "has no table that identifies the kind of case", None, choice, hint)])
 
 

@@ -14,7 +14,7 @@ from reflowshock.workflow.effects.page import effects_table
 from reflowshock.workflow.kinds import every_stage, kind_of, stage_seconds
 from reflowshock.workflow.pipeline.gate import LONG
 from reflowshock.workflow.process.kernel_folder import compilation_time
-from reflowshock.workflow.process.terminal import new_table, styled
+from reflowshock.workflow.process.terminal import new_table, style_text
 from reflowshock.workflow.store.keys import Change
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.state import StageState, examine, why_stale
@@ -61,7 +61,7 @@ def show_plan(store: Store, point: Point, console: Console) -> None:
     case = point.case
     kind, scale = kind_of(case), "" if case.scale == FULL else f", scale {case.scale}"
     outlook = kind.forecast(case)
-    console.print(styled("[bold]{}{}[/]  {}\n", case.case.name, scale, case.case.title))
+    console.print(style_text("[bold]{}{}[/]  {}\n", case.case.name, scale, case.case.title))
     console.print(_stages(store, point, every_stage(case, outlook.seconds)))
     console.print(effects_table(case, outlook.effects, kind.acts))
     for table in kind.plan(case, outlook):
@@ -136,7 +136,7 @@ def _stages(store: Store, point: Point, seconds: Mapping[str, float]) -> Table:
     table = new_table(f"Stages, in {store.folder}", "stage", "", "cost", "why")
     states, costs = examine(store, point), predicted_costs(store, point.case, seconds)
     for name, state in states.items():
-        mark = styled("[yellow]run[/]" if state.stale else "[green]skip[/]")
+        mark = style_text("[yellow]run[/]" if state.stale else "[green]skip[/]")
         table.add_row(name, mark, str(costs[name]) if state.stale else "", reason(state, point.case))
     if once := compilation_time([name for name, state in states.items() if state.stale]):
         table.add_row("kernels", "", f"about {duration(once)}", "compiled once, in these stages")

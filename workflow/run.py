@@ -12,13 +12,13 @@ from reflowshock.workflow.jobs.batch import Machine, failure_of, run_points, sho
 from reflowshock.workflow.pipeline.points import read_case_of_run
 from reflowshock.workflow.pipeline.stage_runner import execute
 from reflowshock.workflow.process.products import read_json
-from reflowshock.workflow.process.terminal import console, print_error, styled
-from reflowshock.workflow.store.folders import locked, read_mark, remove_own
+from reflowshock.workflow.process.terminal import console, print_error, style_text
+from reflowshock.workflow.store.folders import lock_folder, read_mark, remove_program_files
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import discard
 from reflowshock.workflow.store.state import StageState, examine, failed_checks, why_stale
 from reflowshock.workflow.store.store import TRACEBACK, Store
-from reflowshock.workflow.store.view import adopt, listed, not_as_put, remove_unused, withdraw_all
+from reflowshock.workflow.store.view import adopt, altered_files, list_program_files, remove_all_links, remove_unused
 
 WHAT = "run"  # kind of content in the mark of a run folder
 REPORT = "report"
@@ -37,21 +37,21 @@ def run_case(store: Store, point: Point, until: str, machine: Machine, *, force:
     """Make the missing, stale and damaged products of a run and print the result.
 
     Args:
-        store: store of the run folder.
-        point: case of the run.
-        until: last stage to run.
-        machine: resources of the computation.
-        force: whether the folder may contain another case.
+        store: Store of the run folder.
+        point: Case of the run.
+        until: Last stage to run.
+        machine: Resources of the computation.
+        force: Whether the folder may contain another case.
 
     Returns:
         The result; the verdict is empty without a report or without limits in the case.
 
     Raises:
-        CaseError: the folder belongs to something else, is not writable, or contains an input of the case.
-        RunFolderBusy: another process is running in the folder.
+        CaseError: The folder belongs to something else, is not writable, or contains an input of the case.
+        RunFolderBusy: Another process is running in the folder.
     """
     _check_inputs(store, point)
-    with locked(store.folder, WHAT, point.case.case.name, force) as lock:
+    with lock_folder(store.folder, WHAT, point.case.case.name, force) as lock:
         states = examine(store, point)
         required = {stage.name: states[stage.name] for stage in point.case.pipeline.upstream(until)}
         _tell_damage(required)
@@ -74,7 +74,7 @@ def run_case(store: Store, point: Point, until: str, machine: Machine, *, force:
 
 def _check_inputs(store: Store, point: Point) -> None:
     """Raise CaseError if an input file of the case is a product in its own run folder, which the run would replace."""
-    folder, own = store.folder.resolve(), listed(store, store.folder)
+    folder, own = store.folder.resolve(), list_program_files(store, store.folder)
     inside = {key: path for key, path in point.case.files.items() if path.resolve().is_relative_to(folder)}
     for key, path in inside.items():
         if path.resolve().relative_to(folder).as_posix() in own:
@@ -87,11 +87,11 @@ def _conclude(store: Store, point: Point) -> str:
     console.print(f"report: {store.folder / 'report.html'}")
     summary = read_json(store.product(point, REPORT) / "summary.json")
     for warning in summary.get("warnings", ()):
-        console.print(styled("[bold yellow]warning:[/] {}", warning), soft_wrap=True)
+        console.print(style_text("[bold yellow]warning:[/] {}", warning), soft_wrap=True)
     if "answer" not in summary:
         return ""
     design = summary["verdict"]["design"]
-    console.print(styled(f"[bold {COLOURS[design]}]{{}}[/]", summary["answer"]), soft_wrap=True)
+    console.print(style_text(f"[bold {COLOURS[design]}]{{}}[/]", summary["answer"]), soft_wrap=True)
     return design
 
 
@@ -99,7 +99,7 @@ def check_movie(path: Path) -> None:
     """Check that a GIF can be written to a path.
 
     Raises:
-        CaseError: the name does not end in .gif, another file exists there, or the folder is missing.
+        CaseError: The name does not end in .gif, another file exists there, or the folder is missing.
     """
     why = ""
     if path.suffix.lower() != ".gif":
@@ -116,7 +116,7 @@ def write_run_movie(folder: Path, path: Path) -> None:
     """Write the first animated scene of a report as a GIF.
 
     Raises:
-        CaseError: no scene is animated, since its stage has not run.
+        CaseError: No scene is animated, since its stage has not run.
     """
     from reflowshock.workflow.pipeline.report import moving_scene
     from reflowshock.workflow.report.movie import write_movie
@@ -134,20 +134,20 @@ def report_again(folder: Path, name: str, write: Callable[[Path, Case, Path], ob
     If products are missing, the report is partial and not stored as a product: the next run replaces it.
 
     Args:
-        folder: run folder.
-        name: name of its case.
-        write: function that writes the report of a run folder and a case into a folder.
-        stage: stage function of the report.
+        folder: Run folder.
+        name: Name of its case.
+        write: Function that writes the report of a run folder and a case into a folder.
+        stage: Stage function of the report.
 
     Returns:
         Whether the report was written; False if a product is damaged.
 
     Raises:
-        CaseError: nothing was run in the folder.
+        CaseError: Nothing was run in the folder.
     """
     case = read_case_of_run(folder)
     store, point = Store(folder, one_run=True), Point({}, case)
-    with locked(folder, WHAT, name):
+    with lock_folder(folder, WHAT, name):
         states = examine(store, point)
         upstream = {stage_name: states[stage_name] for stage_name in point.case.pipeline.names[:-1]}
         if _tell_damage(upstream, "`reflowshock run` rebuilds it"):
@@ -193,7 +193,7 @@ def verify(store: Store, point: Point) -> bool:
         else:
             record = store.record(point, name) or {"files": {}}
             console.print(f"ok     {name:<11} {len(record['files']) + 1} files")
-    lost = not_as_put(store, store.folder)
+    lost = altered_files(store, store.folder)
     for fault in lost:
         print_error(f"{fault}; `reflowshock run` restores it")
     return not lost and not any(state.stale for state in states.values())
@@ -203,20 +203,20 @@ def clean(folder: Path, name: str, *, unused: bool = False, force: bool = False)
     """Remove the files of the program from a run folder; files of the user stay.
 
     Args:
-        folder: the run folder.
-        name: name of the case.
-        unused: whether to remove only products without links in the run folder, and interrupted work.
-        force: whether to clean the folder even if it contains another case, a study or a convergence study.
+        folder: The run folder.
+        name: Name of the case.
+        unused: Whether to remove only products without links in the run folder, and interrupted work.
+        force: Whether to clean the folder even if it contains another case, a study or a convergence study.
 
     Raises:
-        CaseError: the folder contains another case.
-        RunFolderBusy: a run is active in the folder.
+        CaseError: The folder contains another case.
+        RunFolderBusy: A run is active in the folder.
     """
     mark = read_mark(folder)
     if mark is None:
         console.print(f"nothing to remove: {folder} is not a run folder")
         return
-    with locked(folder, *((mark["holds"], mark["name"]) if force else (WHAT, name))):
+    with lock_folder(folder, *((mark["holds"], mark["name"]) if force else (WHAT, name))):
         store = Store(folder)
         if unused:
             products, works = remove_unused(store)
@@ -224,8 +224,8 @@ def clean(folder: Path, name: str, *, unused: bool = False, force: bool = False)
             console.print(f"removed {' and '.join(removed)} from {folder}")
             return
         for used_store in (*(again for again in store.repeated if again.home.is_dir()), store):
-            withdraw_all(used_store)
-            left = remove_own(used_store.folder)
+            remove_all_links(used_store)
+            left = remove_program_files(used_store.folder)
     console.print(f"removed {folder}" if not folder.exists() else f"removed all products from {folder}")
     if left:
         console.print(f"kept files that the program did not write: {', '.join(left)}")

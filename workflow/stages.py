@@ -22,7 +22,15 @@ def stage_function(case: Case, name: str) -> StageFunction:
 
 
 def report(run: Run, folder: Path) -> Findings:
-    """Write report.html and summary.json from the products."""
+    """Write report.html and summary.json from the products.
+
+    Args:
+        run: Case, cores, and run folder from which the products of earlier stages are read.
+        folder: Folder into which the products of the stage are written.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
+    """
     from reflowshock.workflow.pipeline.report import write_report
 
     write_report(run.folder, run.case, folder)

@@ -10,7 +10,7 @@ from rich.text import Text
 from reflowshock.units import from_si
 from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.process.progress_file import read_progress
-from reflowshock.workflow.process.terminal import styled
+from reflowshock.workflow.process.terminal import style_text
 from reflowshock.workflow.store.folders import is_busy
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.state import StageState, examine
@@ -92,14 +92,14 @@ def metric_text(metric: dict) -> str:
 
 def _state(state: StageState, health: dict) -> Text:
     if state.missing:
-        return styled("[dim]missing[/]")
+        return style_text("[dim]missing[/]")
     if state.damaged:
-        return styled("[bold red]damaged[/]")
+        return style_text("[bold red]damaged[/]")
     if state.stale:
-        return styled("[yellow]stale[/]")
+        return style_text("[yellow]stale[/]")
     if not all(check["ok"] for check in health.values()):
-        return styled("[bold red]unhealthy[/]")
-    return styled("[green]done[/]")
+        return style_text("[bold red]unhealthy[/]")
+    return style_text("[green]done[/]")
 
 
 def _figures(stage: str, metrics: dict) -> str:

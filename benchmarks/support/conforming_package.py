@@ -24,10 +24,10 @@ def conforming_package(refinement: int = 1) -> MeshData:
     """Return the mesh; each element is divided into ``refinement`` elements in each direction."""
     top = GAP + 2 * COPPER_THICKNESS
     levels = [(-THICKNESS, 4), (0.0, 1), (COPPER_THICKNESS, 4), (COPPER_THICKNESS + GAP, 1), (top, 2), (top + LAYER, 2)]
-    z = lines([level for level, _ in levels] + [top + 2 * LAYER], [count * refinement for _, count in levels])
-    x, y = (in_plane(length, refinement) for length in (LENGTH, WIDTH))
+    z = grid_lines([level for level, _ in levels] + [top + 2 * LAYER], [count * refinement for _, count in levels])
+    x, y = (in_plane_lines(length, refinement) for length in (LENGTH, WIDTH))
     points, cells = grid(x, y, z)
-    part = parts(points[cells].mean(axis=1), top)
+    part = assign_parts(points[cells].mean(axis=1), top)
     is_filled = part != ""
     facets = {
         "symmetry_x": on(0, 0.0),
@@ -38,21 +38,21 @@ def conforming_package(refinement: int = 1) -> MeshData:
     return without_unused_nodes(with_pads(mesh_of(points, cells[is_filled], part[is_filled], facets)))[0]
 
 
-def in_plane(length: float, refinement: int) -> np.ndarray:
+def in_plane_lines(length: float, refinement: int) -> np.ndarray:
     """Return the grid lines along one side: through the joints' edges and axes, then half a millimetre apart."""
     joints = [value for centre in (0.5e-3, 1.5e-3) for value in (centre - RADIUS, centre, centre + RADIUS)]
     breaks = [0.0, *joints[:3], 1e-3, *joints[3:], PACKAGE, length]
-    return lines(breaks, [refinement] * 8 + [refinement * round((length - PACKAGE) / 0.5e-3)])
+    return grid_lines(breaks, [refinement] * 8 + [refinement * round((length - PACKAGE) / 0.5e-3)])
 
 
-def lines(breaks: Sequence[float], counts: Sequence[int]) -> np.ndarray:
+def grid_lines(breaks: Sequence[float], counts: Sequence[int]) -> np.ndarray:
     """Return grid lines with ``counts`` equal elements between breaks."""
     gaps = zip(pairwise(breaks), counts, strict=True)
     pieces = [np.linspace(low, high, count + 1)[:-1] for (low, high), count in gaps]
     return np.append(np.concatenate(pieces), breaks[-1])
 
 
-def parts(centre: np.ndarray, top: float) -> np.ndarray:
+def assign_parts(centre: np.ndarray, top: float) -> np.ndarray:
     """Return the part of each cell by its centre, an empty name outside."""
     x, y, z = centre.T
     part = np.full(len(centre), "", dtype=object)

@@ -51,10 +51,12 @@ class DropScene:
         displacement = prescribed_displacement(case.package, case.warpage)
         side = write_displaced_assembly(folder / "flat.msh", displacement, folder / "assembly.msh")
         (folder / "flat.msh").unlink()
-        columns = {site.name: columns_of(site, case.package, case.board, side) for site in sites(case)}
-        fine = [joint(case, site, partial(mesh_joint, columns=columns[site.name]), side) for site in sites(case)]
+        columns = {site.name: columns_of(site, case.package, case.board, side) for site in pad_sites(case)}
+        fine = [
+            mesh_barrel(case, site, partial(mesh_joint, columns=columns[site.name]), side) for site in pad_sites(case)
+        ]
         write_joints(fine, folder / "joints.msh")
-        coarse = [joint(case, site, mesh_coarse_joint, side) for site in sites(case)]
+        coarse = [mesh_barrel(case, site, mesh_coarse_joint, side) for site in pad_sites(case)]
         write_joints(coarse, folder / "coarse_joints.msh")
         return cls(case, folder)
 
@@ -85,17 +87,17 @@ class DropScene:
         )
 
 
-def sites(case: BoardDropCase) -> list[PadSite]:
+def pad_sites(case: BoardDropCase) -> list[PadSite]:
     """Return the joints of a case."""
     return pad_table(case.package, case.board, case.warpage)
 
 
-def joint(case: BoardDropCase, site: PadSite, mesher: Mesher, side: PackageSide) -> JointMesh:
+def mesh_barrel(case: BoardDropCase, site: PadSite, mesher: Mesher, side: PackageSide) -> JointMesh:
     """Return the mesh of a joint."""
-    return mesher(barrel_of(site, case.solder.volume), site, case.package, side)
+    return mesher(make_barrel(site, case.solder.volume), site, case.package, side)
 
 
-def barrel_of(site: PadSite, volume: float) -> ClosedSurface:
+def make_barrel(site: PadSite, volume: float) -> ClosedSurface:
     """Return the barrel of a volume [m^3] that fills the gap between the wetted discs of a joint."""
     lower, upper = site.wetted_radius_board, site.wetted_radius_package
 

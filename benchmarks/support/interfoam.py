@@ -60,7 +60,7 @@ class State:
     speed: np.ndarray
 
 
-def run(folder: Path, wedge: Wedge, parameters: Mapping[str, Any], start: str) -> str:
+def run_case(folder: Path, wedge: Wedge, parameters: Mapping[str, Any], start: str) -> str:
     """Mesh, initialise and run the case in a folder; return the log of interFoam.
 
     Args:
@@ -87,7 +87,7 @@ def _openfoam(command: str, folder: Path) -> str:
     return subprocess.run([command], cwd=folder, env=surroundings, check=True, capture_output=True, text=True).stdout
 
 
-def states(folder: Path, log: str, wedge: Wedge) -> Iterator[State]:
+def read_states(folder: Path, log: str, wedge: Wedge) -> Iterator[State]:
     """Yield the fields of each written time in order."""
     clock = {float(time): float(seconds) for time, seconds in CLOCK.findall(log)}
     times, shape = np.array(sorted(clock)), (wedge.rows, wedge.columns)
@@ -99,7 +99,7 @@ def states(folder: Path, log: str, wedge: Wedge) -> Iterator[State]:
         yield State(time, clock[times[np.abs(times - time).argmin()]], alpha, speed)
 
 
-def version(log: str) -> str:
+def read_version(log: str) -> str:
     """Return the build named in a log."""
     return re.search(r"^Build\s*:\s*(.+)$", log, re.MULTILINE)[1]
 

@@ -90,7 +90,7 @@ class NewtonMotion(ImplicitMotion):
         weight = float(np.linalg.norm(self.body.mass) * np.linalg.norm(self.gravity))
         self._largest = max(self._largest, weight)
         self._newton.setTolerances(rtol=CONVERGED, atol=SMALL * self._largest)
-        self._solution.array = self._acceleration[self._equations.own]
+        self._solution.array = self._acceleration[self._equations.owned]
         self._newton.solve(None, self._solution)
         if self._newton.reason < 0:
             raise ArithmeticError(f"Newton's method stops at {self.time:g} s: {self._newton.reason}")
@@ -105,7 +105,7 @@ class NewtonMotion(ImplicitMotion):
         self.velocity[:] = speed + h * scheme.gamma * self._acceleration
         self._update_force()
         forces = (1.0 + scheme.alpha) * self._total_force() - scheme.alpha * before
-        result.array = (self.body.mass[:, None] * self._acceleration - forces)[self._equations.own]
+        result.array = (self.body.mass[:, None] * self._acceleration - forces)[self._equations.owned]
 
     def apply(self, _preconditioner: PETSc.PC, right: PETSc.Vec, solution: PETSc.Vec) -> None:
         """Solve with the elastic factor, for PETSc."""

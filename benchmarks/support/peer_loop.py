@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable
 
 import numpy as np
-from turns import batch
+from turns import make_batch
 
 
 def problem() -> dict[str, np.ndarray]:
@@ -20,7 +20,7 @@ def problem() -> dict[str, np.ndarray]:
 def serve(force: np.ndarray, works: dict[str, Callable[[], object]]) -> None:
     """Write the internal force [N], shape (n, 3), at the displacement of the problem; answer until the input ends."""
     np.save(sys.argv[2], force)
-    batches = {name: batch(work) for name, work in works.items()}
+    batches = {name: make_batch(work) for name, work in works.items()}
     print("@ready", flush=True)
     for line in sys.stdin:
         print(f"@{batches[line.strip()]()}", flush=True)

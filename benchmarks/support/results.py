@@ -23,7 +23,7 @@ def read_figures(name: str) -> dict[str, Any]:
 def write_figures(name: str, figures: dict[str, Any] | list) -> None:
     """Store the figures of a benchmark with the conditions of the measurement."""
     FOLDER.mkdir(exist_ok=True)
-    text = json.dumps({"conditions": conditions(), "figures": figures}, indent=1)
+    text = json.dumps({"conditions": describe_conditions(), "figures": figures}, indent=1)
     path_of(name).write_text(text + "\n")
 
 
@@ -38,7 +38,7 @@ def path_of(name: str) -> Path:
     return FOLDER / f"{name}.json"
 
 
-def conditions() -> dict[str, Any]:
+def describe_conditions() -> dict[str, Any]:
     """Return date, processor, number of cores, and load averages over five minutes."""
     return {
         "date": datetime.date.today().isoformat(),

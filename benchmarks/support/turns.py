@@ -12,7 +12,7 @@ BATCH_SECONDS = 0.1
 Batch = Callable[[], float]  # makes some calls and returns the processor seconds of one
 
 
-def batch(work: Callable[[], object], seconds: float = BATCH_SECONDS) -> Batch:
+def make_batch(work: Callable[[], object], seconds: float = BATCH_SECONDS) -> Batch:
     """Return a batch of calls that takes about ``seconds``, compiled and warm."""
     work()
     begin = time.process_time()
@@ -28,7 +28,7 @@ def batch(work: Callable[[], object], seconds: float = BATCH_SECONDS) -> Batch:
     return run
 
 
-def in_turns(batches: dict[str, Batch], rounds: int = ROUNDS) -> dict[str, np.ndarray]:
+def measure_in_turns(batches: dict[str, Batch], rounds: int = ROUNDS) -> dict[str, np.ndarray]:
     """Return the processor seconds of a call of each side, one value per round."""
     rows = [[run() for run in batches.values()] for _ in range(rounds)]
     return dict(zip(batches, np.array(rows).T, strict=True))
@@ -39,7 +39,7 @@ def rates(seconds: dict[str, np.ndarray], elements: dict[str, int]) -> dict[str,
     return {name: float(elements[name] / np.median(values)) for name, values in seconds.items()}
 
 
-def ratio(seconds: dict[str, np.ndarray], ours: str, theirs: str) -> float:
+def speed_ratio(seconds: dict[str, np.ndarray], ours: str, theirs: str) -> float:
     """Return the speed of one side over another, the median over rounds."""
     return float(np.median(seconds[theirs] / seconds[ours]))
 

@@ -16,7 +16,7 @@ COMMANDS = {
 }
 
 
-def found_in_runs(folder: Path = RUNS) -> tuple[dict[str, dict], dict[str, str]]:
+def read_run_figures(folder: Path = RUNS) -> tuple[dict[str, dict], dict[str, str]]:
     """Return the figures of existing runs with their limits, and the commands of the missing runs."""
     bars, missing = {}, {}
     for name, (case, limit, elements) in FIGURES.items():

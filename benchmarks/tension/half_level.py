@@ -19,7 +19,7 @@ SUPPORT, STEP, HALVINGS = 4.0, 0.5, 30
 FINE = 1.0 / 3.0
 
 
-def rays(half: bool) -> Floats:
+def ray_directions(half: bool) -> Floats:
     """Return directions, shape (400, 3), uniform over the sphere or its upper half, the first straight up."""
     height = 1.0 - (np.arange(RAYS) / RAYS if half else 2.0 * np.arange(RAYS) / (RAYS - 1.0))
     turn, across = pi * (1.0 + sqrt(5.0)) * np.arange(RAYS), np.sqrt(np.maximum(1.0 - height**2, 0.0))
@@ -38,12 +38,12 @@ def level_points(points: Floats, volume: Floats, spacing: float, half: bool) -> 
     centre = volume @ points / volume.sum()
     if half:
         centre[2] = 0.0
-    distances, directions = np.empty(RAYS), rays(half)
+    distances, directions = np.empty(RAYS), ray_directions(half)
     _cross(points, volume, (centre, SUPPORT * spacing, STEP * spacing, half), directions, distances)
     return centre + distances[:, None] * directions
 
 
-def filled(inside, reach: float, spacing: float) -> tuple[Floats, Floats]:
+def fill_lattice(inside, reach: float, spacing: float) -> tuple[Floats, Floats]:
     """Return a fine lattice, shape (n, 3), in a body within ``reach`` [m] of the origin, and its volumes."""
     fine = FINE * spacing
     places = fine * (np.arange(-int(reach / fine) - 1, int(reach / fine) + 1) + 0.5)

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 
 from benchmarks.tension.colour import ColourFunction
 from benchmarks.tension.free_pressure import FreeSurfacePressure
-from benchmarks.tension.half_level import RAYS, filled, level_points
+from benchmarks.tension.half_level import RAYS, fill_lattice, level_points
 from benchmarks.tension.pairwise import Pairwise, cohesion
 from reflowshock.arrays import Floats
 from reflowshock.particles.flows.droplet import Droplet, DropletNumerics
@@ -44,21 +44,21 @@ ROUND = 1.05
 TOP = 10
 
 
-def start(scene: Droplet, model: str, strength: float = 1.0) -> Simulation:
+def set_up_drop(scene: Droplet, model: str, strength: float = 1.0) -> Simulation:
     """Set up the drop of a scene with one of the models, at the pressure of a sphere."""
     tracked = droplet(scene)
     if model == TRACKED:
         return tracked
     law = tracked.law._replace(tracked=0, shifting=0.0)
-    return untracked(law, fields_at(scene, law, np.array(tracked.fields[:3])), scene, model, strength)
+    return make_untracked(law, fields_at(scene, law, np.array(tracked.fields[:3])), scene, model, strength)
 
 
 def fields_at(scene: Droplet, law: Law, points: Floats) -> Fields:
     """Return particles at rest at points [m], shape (3, n), at the pressure of a sphere."""
-    return flow.liquid_and_walls(points, np.empty((3, 0)), np.full(points.shape[1], scene.laplace_pressure), law)
+    return flow.make_fields(points, np.empty((3, 0)), np.full(points.shape[1], scene.laplace_pressure), law)
 
 
-def untracked(law: Law, fields: Fields, scene: Droplet, model: str, strength: float) -> Simulation:
+def make_untracked(law: Law, fields: Fields, scene: Droplet, model: str, strength: float) -> Simulation:
     """Return a simulation without a tracked surface."""
     parameters = (law, scene.surface_tension, cos(scene.angle))
     if model == "pairwise":
@@ -75,7 +75,7 @@ def unit_drop(across: int, ohnesorge: float, **more) -> Droplet:
     return Droplet(**UNIT | more, viscosity=ohnesorge, numerics=DropletNumerics(particles_per_diameter=across))
 
 
-def follow(simulation: Simulation, until: float, sample: Callable[[Simulation], tuple[float, ...]]) -> dict:
+def run_until(simulation: Simulation, until: float, sample: Callable[[Simulation], tuple[float, ...]]) -> dict:
     """Run to a time; return the samples of every step, the cost, and when and why the liquid came apart."""
     simulation.step(1e-9)  # compiles the kernels
     rows, seconds, looked, torn = [], 0.0, 0, {}
@@ -86,15 +86,20 @@ def follow(simulation: Simulation, until: float, sample: Callable[[Simulation], 
             seconds += process_time() - begin
             rows.append(sample(simulation))
             if simulation.time > looked * until / LOOKS:
-                looked, torn = looked + 1, came_apart(simulation)
+                looked, torn = looked + 1, check_break_up(simulation)
     except (SurfaceLost, FloatingPointError) as error:
         torn = {"torn_apart_at": simulation.time, "why": str(error)}
     count = simulation.fluids
-    figures = {"particles": count, "steps": simulation.steps, "seconds": seconds, "lost": stray(simulation)} | torn
+    figures = {
+        "particles": count,
+        "steps": simulation.steps,
+        "seconds": seconds,
+        "lost": count_detached(simulation),
+    } | torn
     return figures | {"us_per_particle_step": 1e6 * seconds / (count * simulation.steps), "rows": np.array(rows)}
 
 
-def stray(simulation: Simulation) -> int:
+def count_detached(simulation: Simulation) -> int:
     """Return the number of particles detached from the largest part of the liquid."""
     points = np.stack(simulation.fields[:3], axis=1)
     pairs = cKDTree(points).query_pairs(SUPPORT * simulation.law.length, output_type="ndarray")
@@ -102,18 +107,18 @@ def stray(simulation: Simulation) -> int:
     return len(points) - int(np.bincount(connected_components(touch, directed=False)[1]).max())
 
 
-def came_apart(simulation: Simulation) -> dict:
+def check_break_up(simulation: Simulation) -> dict:
     """Return when and why the liquid came apart; empty if it did not."""
     fields = simulation.fields
     if not np.isfinite(np.array(fields[:3])).all():
         return {"torn_apart_at": simulation.time, "why": "positions are not finite"}
-    lost = stray(simulation)
+    lost = count_detached(simulation)
     return (
         {"torn_apart_at": simulation.time, "why": f"{lost} particles left"} if lost > LOST * simulation.fluids else {}
     )
 
 
-def volumes(fields: Fields) -> Floats:
+def particle_volumes(fields: Fields) -> Floats:
     """Return particle volumes [m^3]."""
     return fields.mass / fields.density
 
@@ -126,19 +131,19 @@ def core_pressure(simulation: Simulation, radius: float) -> float:
     return float((simulation.pressures + model_pressure)[core].mean())
 
 
-def radii(simulation: Simulation) -> Floats:
+def level_radii(simulation: Simulation) -> Floats:
     """Return the distances [m] of the level from the centre."""
-    points, volume = np.stack(simulation.fields[:3], axis=1), volumes(simulation.fields)
+    points, volume = np.stack(simulation.fields[:3], axis=1), particle_volumes(simulation.fields)
     level = level_points(points, volume, simulation.law.spacing, half=False)
     return np.linalg.norm(level - volume @ points / volume.sum(), axis=1)
 
 
-def late(rows: Floats) -> Floats:
+def last_tenth(rows: Floats) -> Floats:
     """Return the last tenth of the samples, with time in the first column."""
     return rows[rows[:, 0] >= 0.9 * rows[-1, 0]]
 
 
-def at_rest(model: str, across: int, strength: float, shape: str = "cube") -> dict:
+def run_to_rest(model: str, across: int, strength: float, shape: str = "cube") -> dict:
     """Let a cube become a sphere; return pressure, roundness and capillary number at rest."""
     scene = unit_drop(across, 0.2, start=shape)
 
@@ -149,28 +154,28 @@ def at_rest(model: str, across: int, strength: float, shape: str = "cube") -> di
             flow_state.fastest,
         )
 
-    simulation = start(scene, model, strength)
-    figures = follow(simulation, 2.0, sample)
+    simulation = set_up_drop(scene, model, strength)
+    figures = run_until(simulation, 2.0, sample)
     rows = figures.pop("rows")
     if "torn_apart_at" in figures:
         return figures
-    radius = radii(simulation)
+    radius = level_radii(simulation)
     return figures | {
-        "pressure_error": float(np.nanmean(late(rows)[:, 1])) / scene.laplace_pressure - 1.0,
-        "pressure_drift": float(np.nanstd(late(rows)[:, 1])) / scene.laplace_pressure,
+        "pressure_error": float(np.nanmean(last_tenth(rows)[:, 1])) / scene.laplace_pressure - 1.0,
+        "pressure_drift": float(np.nanstd(last_tenth(rows)[:, 1])) / scene.laplace_pressure,
         "roundness": float(radius.max() / radius.min()),
-        "capillary_number": float(late(rows)[:, 2].max()) * scene.viscosity / scene.surface_tension,
-        "volume_error": float(volumes(simulation.fields).sum() / scene.volume - 1.0),
+        "capillary_number": float(last_tenth(rows)[:, 2].max()) * scene.viscosity / scene.surface_tension,
+        "volume_error": float(particle_volumes(simulation.fields).sum() / scene.volume - 1.0),
     }
 
 
-def cap_at_rest(degrees: float, model: str, across: int, strength: float) -> dict:
+def run_cap_to_rest(degrees: float, model: str, across: int, strength: float) -> dict:
     """Let a half sphere become a cap; return the errors of height and base."""
     if model == "free-surface pressure":
         return {"why": "the model has no contact angle; at a mirror the angle is 90 degrees"}
     scene = unit_drop(across, 0.2, contact_angle=radians(degrees))
-    simulation = start(scene, model, strength)
-    figures = follow(simulation, 2.5, lambda flow_state: (flow_state.time, flow_state.fastest))
+    simulation = set_up_drop(scene, model, strength)
+    figures = run_until(simulation, 2.5, lambda flow_state: (flow_state.time, flow_state.fastest))
     rows = figures.pop("rows")
     if "torn_apart_at" in figures:
         return figures
@@ -182,19 +187,19 @@ def cap_at_rest(degrees: float, model: str, across: int, strength: float) -> dic
         return (points[:, 2] > 0.0) & (np.linalg.norm(points - below, axis=1) < radius)
 
     points = np.stack(simulation.fields[:3], axis=1)
-    level = level_points(points, volumes(simulation.fields), spacing, half=True)
-    exact = level_points(*filled(inside, 2.0 * radius, spacing), spacing, half=True)
+    level = level_points(points, particle_volumes(simulation.fields), spacing, half=True)
+    exact = level_points(*fill_lattice(inside, 2.0 * radius, spacing), spacing, half=True)
     bases = [base_width(shape, spacing) for shape in (level, exact)]
     tops = [shape[: RAYS // TOP, 2].mean() for shape in (level, exact)]
     return figures | {
         "height_error": float(tops[0] / tops[1] - 1.0),
         "base_error": bases[0] / bases[1] - 1.0,
-        "capillary_number": float(late(rows)[:, 1].max()) * scene.viscosity / scene.surface_tension,
-        "volume_error": float(volumes(simulation.fields).sum() / scene.volume - 1.0),
+        "capillary_number": float(last_tenth(rows)[:, 1].max()) * scene.viscosity / scene.surface_tension,
+        "volume_error": float(particle_volumes(simulation.fields).sum() / scene.volume - 1.0),
     }
 
 
-def stretched(simulation: Simulation) -> Simulation:
+def stretch_drop(simulation: Simulation) -> Simulation:
     """Return the drop stretched along z, with its surface."""
     fields, factors = simulation.fields, np.array([STRETCH**-0.5, STRETCH**-0.5, STRETCH])
     for axis in range(3):
@@ -204,7 +209,7 @@ def stretched(simulation: Simulation) -> Simulation:
     return Simulation(fields, simulation.fluids, simulation.law, simulation.surface)
 
 
-def swing(model: str, across: int, strength: float) -> dict:
+def run_swing(model: str, across: int, strength: float) -> dict:
     """Let a stretched drop swing; return errors of period and decay of a damped cosine fitted to second moments."""
     scene = unit_drop(across, 0.05)
     frequency = rayleigh_frequency(2, 0.5, 1.0, 1.0)
@@ -214,7 +219,7 @@ def swing(model: str, across: int, strength: float) -> dict:
         x, y, z = flow_state.fields[:3]
         return flow_state.time * frequency, float(flow_state.fields.mass @ (z**2 - 0.5 * (x**2 + y**2)))
 
-    figures = follow(stretched(start(scene, model, strength)), 2.5 * 2.0 * pi / frequency, sample)
+    figures = run_until(stretch_drop(set_up_drop(scene, model, strength)), 2.5 * 2.0 * pi / frequency, sample)
     rows = figures.pop("rows")
     if "torn_apart_at" in figures:
         return figures
@@ -236,7 +241,7 @@ def swing(model: str, across: int, strength: float) -> dict:
     }
 
 
-def pair(scene: Droplet, model: str, strength: float, gap: float = EDGE, speed: float = APPROACH) -> Simulation:
+def make_pair(scene: Droplet, model: str, strength: float, gap: float = EDGE, speed: float = APPROACH) -> Simulation:
     """Return two drops along x that approach each other at a speed [m/s], a gap [spacings] between them."""
     drop = droplet(scene)
     aside = np.array([0.5 * scene.diameter + 0.5 * gap * drop.law.spacing, 0.0, 0.0])
@@ -246,38 +251,38 @@ def pair(scene: Droplet, model: str, strength: float, gap: float = EDGE, speed: 
         law = drop.law._replace(tracked=0, shifting=0.0)
         fields = fields_at(scene, law, both)
         fields.u[:] = -speed * np.sign(both[0])
-        return untracked(law, fields, scene, model, strength)
+        return make_untracked(law, fields, scene, model, strength)
     corners, triangles = surface.points.copy(), surface.triangles.copy()
     surface.mesh.points = corners - aside
     surface.add(corners + aside, triangles)
-    fields = flow.liquid_and_walls(both, np.empty((3, 0)), np.zeros(both.shape[1]), drop.law)
+    fields = flow.make_fields(both, np.empty((3, 0)), np.zeros(both.shape[1]), drop.law)
     fields.u[:] = -speed * np.sign(both[0])
     return Simulation(fields, both.shape[1], drop.law, surface)
 
 
-def merging(model: str, across: int, strength: float) -> dict:
+def run_merging(model: str, across: int, strength: float) -> dict:
     """Let two drops merge; return radius, roundness and volume of the sphere, and the time until it is nearly round."""
     scene = unit_drop(across, 0.2)
-    simulation = pair(scene, model, strength)
+    simulation = make_pair(scene, model, strength)
 
     def sample(flow_state):
         x, y, z = (axis - axis.mean() for axis in flow_state.fields[:3])
         return flow_state.time, sqrt(float((x**2).sum() / (0.5 * (y**2 + z**2).sum()))), flow_state.fastest
 
-    figures = follow(simulation, 3.0, sample)
+    figures = run_until(simulation, 3.0, sample)
     rows = figures.pop("rows")
     if "torn_apart_at" in figures:
         return figures
     radius, spacing = np.cbrt(0.25), simulation.law.spacing
-    exact = filled(lambda points: np.linalg.norm(points, axis=1) < radius, radius, spacing)
-    distance = radii(simulation)
+    exact = fill_lattice(lambda points: np.linalg.norm(points, axis=1) < radius, radius, spacing)
+    distance = level_radii(simulation)
     level = np.linalg.norm(level_points(*exact, spacing, half=False), axis=1).mean()
     longer = np.flatnonzero(rows[:, 1] > ROUND)
     return figures | {
         "radius_error": float(distance.mean() / level - 1.0),
         "roundness": float(distance.max() / distance.min()),
         "pressure_error": core_pressure(simulation, radius) * radius / 2.0 - 1.0,
-        "volume_error": float(volumes(simulation.fields).sum() / (2.0 * scene.volume) - 1.0),
+        "volume_error": float(particle_volumes(simulation.fields).sum() / (2.0 * scene.volume) - 1.0),
         "round_after": float(rows[longer[-1], 0]) if len(longer) else 0.0,
-        "capillary_number": float(late(rows)[:, 2].max()) * scene.viscosity / scene.surface_tension,
+        "capillary_number": float(last_tenth(rows)[:, 2].max()) * scene.viscosity / scene.surface_tension,
     }

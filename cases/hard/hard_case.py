@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from reflowshock.cases.hard.bound import Bound, read_bound
 from reflowshock.cases.hard.trial import FAMILIES, Trial, trials
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 from reflowshock.problem import Problem, as_toml
 from reflowshock.quantity import Quantity
 from reflowshock.units import UnitError
@@ -138,7 +138,7 @@ def _read_head(table: dict, source: str) -> HardCaseFile:
     except ValidationError as error:
         problems += translate(HardCaseFile, error, table, {problem.key for problem in problems})
     if head is not None and head.family not in FAMILIES:
-        choice, hint = "one of " + ", ".join(FAMILIES), nearest(head.family, FAMILIES)
+        choice, hint = "one of " + ", ".join(FAMILIES), find_nearest(head.family, FAMILIES)
         problems.append(Problem("family", "unknown family", head.family, choice, hint))
     if head is None or problems:
         raise CaseError(source, problems)
@@ -148,7 +148,7 @@ def _read_head(table: dict, source: str) -> HardCaseFile:
 def _trial_of(head: HardCaseFile, source: str) -> Trial:
     all_trials = trials()
     if head.trial not in all_trials:
-        choice, hint = "one of " + ", ".join(all_trials), nearest(head.trial, all_trials)
+        choice, hint = "one of " + ", ".join(all_trials), find_nearest(head.trial, all_trials)
         raise CaseError(source, [Problem("trial", "unknown trial", head.trial, choice, hint)])
     return all_trials[head.trial]
 
@@ -162,7 +162,7 @@ def _bounds(head: HardCaseFile, trial: Trial, problems: list[Problem]) -> Iterat
     for measure, values in head.bounds.items():
         key, names = f"bounds.{measure}", trial.measures
         if names is not None and measure not in names:
-            choice, hint = "one of " + ", ".join(names), nearest(measure, names)
+            choice, hint = "one of " + ", ".join(names), find_nearest(measure, names)
             problems.append(Problem(key, f"the trial {head.trial} measures no such thing", values, choice, hint))
             continue
         texts = values if isinstance(values, list) else [values]

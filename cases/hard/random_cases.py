@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, Phase, Verbosity
 from reflowshock.cases.hard.draws import DRAWS
 from reflowshock.cases.hard.hard_case import HardCase, hard_cases
 from reflowshock.cases.hard.verdict import attempt
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 from reflowshock.problem import Problem
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.toml_file import read_toml
@@ -115,7 +115,7 @@ def read_random_file(path: Path) -> RandomFile | None:
     if draws is None:
         return None
     if draws not in DRAWS:
-        choice, hint = "one of " + ", ".join(DRAWS), nearest(str(draws), DRAWS)
+        choice, hint = "one of " + ", ".join(DRAWS), find_nearest(str(draws), DRAWS)
         raise CaseError(str(path), [Problem("draws", "unknown draw", draws, choice, hint)])
     return RandomFile(path, draws, share, table)
 

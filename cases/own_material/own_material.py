@@ -18,7 +18,7 @@ from reflowshock.fem.dynamics.participant import explicit_motion
 from reflowshock.fem.forces.force_ufl import Law
 from reflowshock.fem.loads.load import half_sine_drop
 from reflowshock.fem.mesh.mesh import MeshData, boundary_facets
-from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, make_body, make_rank_elements
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.materials.library import FR4
 from reflowshock.materials.parameters import Isotropic
@@ -86,11 +86,11 @@ def drop(comm: MPI.Comm, stiffer: float = STIFFER, duration: float = 0.5 * MS) -
     model = prepare(mesh(), "dns")["dns"] if comm.rank == 0 else None
     tables = comm.bcast(model.tables if model else None)
     local = distribute(comm, model.mesh if model else None)
-    pieces = make_pieces(local, tables, {"board": FR4, "potting": POTTING, "part": STEEL})
-    sudden = pieces.with_laws(tables.part_names, {"potting": potting(0.0, stiffer)})
+    rank_elements = make_rank_elements(local, tables, {"board": FR4, "potting": POTTING, "part": STEEL})
+    sudden = rank_elements.with_laws(tables.part_names, {"potting": potting(0.0, stiffer)})
     step = 0.8 * comm.allreduce(float(sudden.steps.min()), MPI.MIN)
-    pieces = pieces.with_laws(tables.part_names, {"potting": potting(step, stiffer)})
-    body = make_body(comm, pieces, tables, np.ones(len(pieces.steps)), ForceOptions("small", step))
+    rank_elements = rank_elements.with_laws(tables.part_names, {"potting": potting(step, stiffer)})
+    body = make_body(comm, rank_elements, tables, np.ones(len(rank_elements.steps)), ForceOptions("small", step))
     motion = explicit_motion(body, [half_sine_drop(PEAK, PULSE)], step)
     top = body.shared.owned & np.isclose(body.local.points[:, 2], 3.4 * MM)
     rows = []

@@ -10,7 +10,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from reflowshock.data_file import write_at_once
+from reflowshock.data_file import write_atomically
 from reflowshock.fem.coupling.speeds import (
     FAMILIES,
     Kind,
@@ -169,7 +169,7 @@ def store_costs(folder: Path, measured: Measured) -> None:
     """Write measured costs for a restart."""
     folder.mkdir(parents=True, exist_ok=True)
     cost = {"fixed": measured.cost.fixed.tolist(), "element": measured.cost.element.tolist()}
-    write_at_once(folder / COST_FILE, json.dumps(cost | {"latency": measured.latency}).encode())
+    write_atomically(folder / COST_FILE, json.dumps(cost | {"latency": measured.latency}).encode())
 
 
 def plan_from(

@@ -1,6 +1,6 @@
 """Coefficients of stabilised leapfrog substeps, from shifted Chebyshev polynomials.
 
-With z = DT^2 M^-1 K, p small steps from rest make q_p = T_p(delta - z / omega) / T_p(delta) q_0 of q_0,
+With z = DT^2 M^-1 K, p small steps from rest at q_0 lead to q_p = T_p(delta - z / omega) / T_p(delta) q_0,
 delta = 1 + nu / p^2, omega = 2 T_p'(delta) / T_p(delta) (Carle, Hochbruck & Sturm, SIAM J. Numer. Anal. 58, 2020;
 nu = 0 is the leapfrog of Diaz & Grote, SIAM J. Sci. Comput. 31, 2009). Leapfrog with 2 (q_0 - q_p) for z q_0 is stable
 up to z = omega (1 + delta), and |q_p| <= 1 / T_p(delta) from z = omega (delta - 1) on.
@@ -38,7 +38,7 @@ class Substeps:
 
     @classmethod
     def of(cls, count: int, level: int, damping: float = 0.0) -> "Substeps":
-        """Return the ``count`` substeps of a level; arguments as ``stabilisation``."""
+        """Return the coefficients of ``count`` substeps of a level; other arguments as in ``stabilisation``."""
         delta = 1.0 + stabilisation(level, damping) / count**2
         value, slope = chebyshev(count, delta)
         omega = 2.0 * slope[count] / value[count]
@@ -55,11 +55,11 @@ class Substeps:
 def stabilisation(level: int, damping: float = 0.0) -> float:
     """Return the stabilisation parameter nu of a level.
 
-    A step of an inner level is itself a leapfrog whose highest frequencies reach z = 4 / (1 + nu) or so, whatever the
-    elements: nu must grow inwards for that to stay below the reach of the level around it. ``FIRST`` and ``GROWTH``
-    were found on chains of random elements, levels and impedances (tests/stability/test_fem_levels.py). Damping by
-    beta K_eff, half a step late, is stable up to z (1 + 2 beta / DT) = 4: the largest z = 2 + 2 / cosh(sqrt(2 nu)) of
-    many substeps is lowered by as much.
+    A step of an inner level is itself a leapfrog whose highest frequencies reach about z = 4 / (1 + nu) for any
+    elements: nu must grow inwards so that this stays below the stability limit of the surrounding level. ``FIRST``
+    and ``GROWTH`` were determined on chains of random elements, levels and impedances
+    (tests/stability/test_fem_levels.py). Damping by beta K_eff, half a step late, is stable up to
+    z (1 + 2 beta / DT) = 4: the largest z = 2 + 2 / cosh(sqrt(2 nu)) of many substeps is reduced by the same factor.
 
     Args:
         level: Number of the level, 1 for the outermost.

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.division.chebyshev import LARGEST_DAMPING
-from reflowshock.fem.division.choose_levels import Pace, least_steps
-from reflowshock.fem.division.divide import cut_nodes, grown
+from reflowshock.fem.division.choose_levels import StepLimits, least_steps
+from reflowshock.fem.division.divide import cut_nodes, grow_region
 from reflowshock.fem.division.division import BUFFERED, Division, Rules
 from reflowshock.fem.division.whole import Survey, Whole, seeds_of, touching
 from reflowshock.fem.errors import CouplingError, PulseError
@@ -36,8 +36,8 @@ def empty_model_message(role: str, whole: Whole, rules: Rules) -> str:
     """Return why a model has no cell, and possible remedies, as text."""
     if role == "meso":
         return (
-            "two_scale needs something finer than the rest: the mesh has the parts"
-            f" {', '.join(whole.mesh.part_names)} and {len(whole.tie.slave)} tied nodes; mode dns computes it"
+            "mode = two_scale needs elements that are finer than the board; the mesh has the parts"
+            f" {', '.join(whole.mesh.part_names)} and {len(whole.tie.slave)} tied nodes; use mode = dns"
         )
     return (
         f"the macro model is empty: all board elements are within {rules.coupling.buffer_layers} layers of the joints"
@@ -62,7 +62,7 @@ def check_buffer(whole: Whole, survey: Survey, division: Division, rules: Rules)
             f" {location_of(whole, foreign)}; try coupling.scheme = local_steps, which allows this interface"
         )
     layers = rules.coupling.buffer_layers
-    close = division.macro & grown(cells, seeds_of(whole, ~rules.coarse), rules.coarse, layers)
+    close = division.macro & grow_region(cells, seeds_of(whole, ~rules.coarse), rules.coarse, layers)
     if close.any():
         raise CouplingError(
             f"{np.sum(close)} elements of the macro model are too close to the joints, the first"
@@ -73,12 +73,12 @@ def check_buffer(whole: Whole, survey: Survey, division: Division, rules: Rules)
 
 def check_linear(survey: Survey, division: Division, rules: Rules) -> None:
     """Check that elements with local steps are linear and lightly damped; raises as ``check_division``."""
-    path = division.meso & ~survey.linear
-    if path.any():
-        roles = ", ".join(np.unique(survey.role[path]).tolist())
+    unsupported = division.meso & ~survey.linear
+    if unsupported.any():
+        roles = ", ".join(np.unique(survey.role[unsupported]).tolist())
         raise CouplingError(
             f"coupling.scheme = local_steps supports only linear elastic elements at small strains, but"
-            f" {np.sum(path)} elements of {roles} are not; use held_velocity or gravouil_combescure"
+            f" {np.sum(unsupported)} elements of {roles} are not; use held_velocity or gravouil_combescure"
         )
     largest = LARGEST_DAMPING * division.plan.window
     if rules.stiffness > largest:
@@ -107,9 +107,9 @@ def steps_of(
     """Yield for each step its name, its size [s], the cells that limit it (ne,), and their step limits (ne,) [s]."""
     cells, plan = whole.mesh.cells, division.plan
     if division.scheme == "local_steps":
-        pace = Pace(survey.step, survey.cost, plan.window, rules.fraction, rules.stiffness)
+        limits = StepLimits(survey.step, survey.cost, plan.window, rules.fraction, rules.stiffness)
         steps = plan.window / division.counts
-        shares = steps / least_steps(division.ratios, pace)  # usable fraction of a critical step at each level
+        shares = steps / least_steps(division.ratios, limits)  # usable fraction of a critical step at each level
         for level, (step, share) in enumerate(zip(steps.tolist(), shares.tolist(), strict=True)):
             yield f"the step of level {level}", step, division.level == level, share * survey.step
         return

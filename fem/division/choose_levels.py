@@ -21,7 +21,7 @@ ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
-class Pace:
+class StepLimits:
     """Critical steps and costs from which the step levels follow.
 
     Attributes:
@@ -47,24 +47,24 @@ class Pace:
     def outermost(self) -> float:
         """Smallest critical step times fraction of an element that can take the window [s].
 
-        Damping requires DT^2 (1 + 2 beta / DT) below the square of the critical step; inside levels their nu accounts
-        for it.
+        Damping requires DT^2 (1 + 2 beta / DT) below the square of the critical step; inside the levels, the
+        stabilisation parameter nu accounts for it.
         """
         return self.window * math.sqrt(1.0 + 2.0 * self.fraction * self.damping)
 
 
 def choose_levels(
-    cells: NDArray[np.int32], tie: "Tie", pace: Pace, most: int
+    cells: NDArray[np.int32], tie: "Tie", limits: StepLimits, most: int
 ) -> tuple[NDArray[np.int32], tuple[int, ...]]:
     """Choose the levels of all elements of a mesh.
 
-    A level has all nodes of the elements that need its step, masters of slaves among them, and all elements of these
-    nodes: so it grows by one layer of elements that could take larger steps.
+    A level contains all nodes of the elements that need its step, including the masters of slaves, and all elements of
+    these nodes. It thus grows by one layer of elements that could take larger steps.
 
     Args:
         cells: Nodes of each element, shape (ne, k).
         tie: Slaves and masters of the mesh.
-        pace: Critical steps and costs of the elements.
+        limits: Critical steps and costs of the elements.
         most: Largest number of levels below the window, at least 1.
 
     Returns:
@@ -74,19 +74,19 @@ def choose_levels(
     Raises:
         LevelError: The elements need more than ``LARGEST_RATIO`` steps in a level.
     """
-    needed = governing_steps(cells, tie, pace.fraction * pace.steps)
-    if needed.min() >= pace.outermost * (1.0 - ROUNDING):
+    needed = governing_steps(cells, tie, limits.fraction * limits.steps)
+    if needed.min() >= limits.outermost * (1.0 - ROUNDING):
         return np.zeros(len(cells), np.int32), ()
     order = np.argsort(needed)
-    cost = np.concatenate([[0.0], np.cumsum(pace.cost[order])])
-    candidates = list(all_ratios(pace, pace.window / needed.min(), (), most))
+    cost = np.concatenate([[0.0], np.cumsum(limits.cost[order])])
+    candidates = list(all_ratios(limits, limits.window / needed.min(), (), most))
     if not candidates:
         raise LevelError(
-            f"the window {pace.window:.3e} s is {pace.window / needed.min():.3g} times the smallest step of an element,"
-            f" {needed.min():.3e} s; allowed: {LARGEST_RATIO} steps per level and {most} levels"
+            f"the window {limits.window:.3e} s is {limits.window / needed.min():.3g} times the smallest step of an"
+            f" element, {needed.min():.3e} s; allowed: {LARGEST_RATIO} steps per level and {most} levels"
         )
-    ratios = candidates[int(np.argmin(window_costs(candidates, needed[order], cost, pace)))]
-    return np.sum(needed[:, None] < least_steps(ratios, pace)[:-1], axis=1, dtype=np.int32), ratios
+    ratios = candidates[int(np.argmin(window_costs(candidates, needed[order], cost, limits)))]
+    return np.sum(needed[:, None] < least_steps(ratios, limits)[:-1], axis=1, dtype=np.int32), ratios
 
 
 def governing_steps(cells: NDArray[np.int32], tie: "Tie", steps: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -101,11 +101,11 @@ def governing_steps(cells: NDArray[np.int32], tie: "Tie", steps: NDArray[np.floa
     return node[cells].min(axis=1)
 
 
-def least_steps(ratios: tuple[int, ...], pace: Pace) -> NDArray[np.float64]:
+def least_steps(ratios: tuple[int, ...], limits: StepLimits) -> NDArray[np.float64]:
     """Return the smallest usable critical step (times fraction) at levels 0, 1, ..., shape (levels + 1,) [s]."""
     counts = np.cumprod(ratios)
-    reaches = [reach_of(ratio, level, pace.damping) for level, ratio in enumerate(ratios, 1)]
-    return np.array([pace.outermost, *(pace.window / (counts * reaches))]) * (1.0 - ROUNDING)
+    reaches = [reach_of(ratio, level, limits.damping) for level, ratio in enumerate(ratios, 1)]
+    return np.array([limits.outermost, *(limits.window / (counts * reaches))]) * (1.0 - ROUNDING)
 
 
 @cache
@@ -114,27 +114,27 @@ def reach_of(ratio: int, level: int, damping: float) -> float:
     return Substeps.of(ratio, level, damping).reach
 
 
-def all_ratios(pace: Pace, needed: float, inner: tuple[int, ...], most: int) -> Iterator[tuple[int, ...]]:
+def all_ratios(limits: StepLimits, needed: float, inner: tuple[int, ...], most: int) -> Iterator[tuple[int, ...]]:
     """Yield the ratios of one to ``most`` levels that divide a window into at least ``needed`` steps.
 
     Args:
-        pace: Critical steps and costs of the elements.
+        limits: Critical steps and costs of the elements.
         needed: Step of level 0 over the smallest step.
         inner: Ratios of the surrounding levels.
         most: Largest number of further levels.
     """
     level = len(inner) + 1
     for ratio in range(2, LARGEST_RATIO + 1):
-        reached = ratio * reach_of(ratio, level, pace.damping)
+        reached = ratio * reach_of(ratio, level, limits.damping)
         if reached >= needed * (1.0 - ROUNDING):
             yield (*inner, ratio)
             return
         if most > 1 and needed / ratio <= LARGEST_RATIO ** (most - 1):
-            yield from all_ratios(pace, needed / ratio, (*inner, ratio), most - 1)
+            yield from all_ratios(limits, needed / ratio, (*inner, ratio), most - 1)
 
 
 def window_costs(
-    candidates: list[tuple[int, ...]], needed: NDArray[np.float64], cost: NDArray[np.float64], pace: Pace
+    candidates: list[tuple[int, ...]], needed: NDArray[np.float64], cost: NDArray[np.float64], limits: StepLimits
 ) -> NDArray[np.float64]:
     """Return the predicted cost of a window for each candidate, for element updates and substeps.
 
@@ -144,7 +144,7 @@ def window_costs(
         candidates: Ratios of the levels.
         needed: Required step of each element in ascending order, shape (ne,) [s].
         cost: Cumulative cost of an update of the elements in this order, shape (ne + 1,).
-        pace: Critical steps and costs of the elements.
+        limits: Critical steps and costs of the elements.
     """
     totals = np.empty(len(candidates))
     lengths = np.array([len(ratios) for ratios in candidates])
@@ -152,11 +152,11 @@ def window_costs(
         rows = np.flatnonzero(lengths == length)
         ratios = np.array([candidates[row] for row in rows])
         counts = np.cumprod(ratios, axis=1)
-        least = np.full(ratios.shape, pace.outermost)
+        least = np.full(ratios.shape, limits.outermost)
         for level in range(1, length):
-            reach = {ratio: reach_of(ratio, level, pace.damping) for ratio in range(2, LARGEST_RATIO + 1)}
+            reach = {ratio: reach_of(ratio, level, limits.damping) for ratio in range(2, LARGEST_RATIO + 1)}
             reaches = np.array([reach.get(ratio, 1.0) for ratio in range(LARGEST_RATIO + 1)])
-            least[:, level] = pace.window / (counts[:, level - 1] * reaches[ratios[:, level - 1]])
+            least[:, level] = limits.window / (counts[:, level - 1] * reaches[ratios[:, level - 1]])
         finer = cost[np.searchsorted(needed, least * (1.0 - ROUNDING))]
         beyond = np.concatenate([finer[:, 1:], np.zeros((len(rows), 1))], axis=1)
         totals[rows] = (counts * (finer - beyond + SUBSTEP_COST)).sum(axis=1) - finer[:, 0]

@@ -1,7 +1,7 @@
 """Decisions on scheme, windows and step levels, from critical steps and costs of cells alone.
 
 ``divide`` decides for the cells of a mesh. ``divide_estimate`` decides for a mesh that is not built yet, in which each
-part, or each layer of a part, counts as one cell. The module loads no compiled code, so that ``plan`` can ask it.
+part, or each layer of a part, counts as one cell. The module loads no compiled code, so that ``plan`` can use it.
 """
 
 import math
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reflowshock.fem.division.chebyshev import LARGEST_DAMPING
-from reflowshock.fem.division.choose_levels import Pace, choose_levels
+from reflowshock.fem.division.choose_levels import StepLimits, choose_levels
 from reflowshock.fem.division.division import Choice, Division, Rules, SchemeName, choose_scheme
 from reflowshock.fem.division.path_levels import Around, with_path_levels
 from reflowshock.fem.errors import CouplingError
@@ -22,7 +22,7 @@ from reflowshock.fem.mesh.tie import Tie
 
 @dataclass(frozen=True, slots=True)
 class MeshEstimate:
-    """Parts of a mesh that is not built yet; the layers of a part may be rows of their own.
+    """Parts of a mesh that is not built yet; each row is a part or a layer of a part.
 
     Attributes:
         names: Part of each row.
@@ -61,7 +61,7 @@ def decide_scheme(rules: Rules, steps: NDArray[np.float64], linear: bool, has_bu
             "coupling.scheme = local_steps does not support springs at supports; use held_velocity or impulse"
         )
     if rules.copied is not None:
-        return Choice("held_velocity", "coupling.direction = one_way: nothing comes back that could grow")
+        return Choice("held_velocity", "coupling.direction = one_way: without feedback nothing becomes unstable")
     if setting != "auto":
         return Choice(setting, f"coupling.scheme = {setting}")
     board_step = float(steps[rules.coarse].min(initial=np.inf))
@@ -93,26 +93,28 @@ def in_two_steps(scheme: SchemeName, macro: NDArray[np.bool_], meso: NDArray[np.
     return Division(scheme, macro, meso, meso.astype(np.int32), (plan.substeps,), plan)
 
 
-def in_local_steps(cells: NDArray[np.int32], tie: Tie, pace: Pace, plan: WindowPlan, most_levels: int) -> Division:
+def in_local_steps(
+    cells: NDArray[np.int32], tie: Tie, limits: StepLimits, plan: WindowPlan, most_levels: int
+) -> Division:
     """Return the division in levels of least cost inside a window.
 
     Args:
         cells: Nodes of the cells, shape (ne, k).
         tie: Tied nodes.
-        pace: Critical steps and costs of the cells.
+        limits: Critical steps and costs of the cells.
         plan: Windows; the substeps follow from the levels.
         most_levels: Largest number of levels below the window.
 
     Raises:
         LevelError: The critical steps differ by more than the levels allow.
     """
-    level, ratios = choose_levels(cells, tie, pace, most_levels)
+    level, ratios = choose_levels(cells, tie, limits, most_levels)
     return Division("local_steps", level == 0, level > 0, level, ratios, replace(plan, substeps=math.prod(ratios)))
 
 
-def in_path_levels(division: Division, rules: Rules, pace: Pace, around: Around) -> Division:
+def in_path_levels(division: Division, rules: Rules, limits: StepLimits, around: Around) -> Division:
     """Return a division of held velocity with step levels in its meso model; arguments as ``with_path_levels``."""
-    return with_path_levels(division, pace, around, rules.coupling.most_levels)
+    return with_path_levels(division, limits, around, rules.coupling.most_levels)
 
 
 def divide_estimate(estimate: MeshEstimate, rules: Rules) -> Division:
@@ -132,18 +134,23 @@ def divide_estimate(estimate: MeshEstimate, rules: Rules) -> Division:
     choice = decide_scheme(rules, estimate.steps, estimate.linear, lambda: True)
     macro = estimate.macro if rules.copied is None else ~rules.copied
     plan = plan_estimate(estimate, rules)
-    pace = Pace(estimate.steps, estimate.cost, plan.window, rules.fraction)  # damping changes the levels little
+    limits = StepLimits(estimate.steps, estimate.cost, plan.window, rules.fraction)  # damping changes the levels little
     division = in_two_steps(choice.scheme, macro, ~macro, plan)
     if choice.scheme == "local_steps":
         cells = np.arange(len(estimate.names), dtype=np.int32)[:, None]
-        division = in_local_steps(cells, Tie.none(), pace, plan, rules.coupling.most_levels)
+        division = in_local_steps(cells, Tie.none(), limits, plan, rules.coupling.most_levels)
     elif choice.scheme == "held_velocity" and rules.copied is None and not rules.pushed:
-        division = in_path_levels(division, rules, pace, lambda cells: ~macro & (estimate.touching & cells).any(axis=1))
+        division = in_path_levels(
+            division, rules, limits, lambda cells: ~macro & (estimate.touching & cells).any(axis=1)
+        )
     return replace(division, why=choice.why)
 
 
 def slow_rows(rules: Rules) -> NDArray[np.bool_]:
-    """Return the rows of an estimated mesh that take the window, shape (n,): the board, one way all that drives."""
+    """Return the rows of an estimated mesh that take the window, shape (n,).
+
+    They are the board, or in one-way coupling all rows of the driving model.
+    """
     return rules.coarse if rules.copied is None else ~rules.copied
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.division.choose_levels import SUBSTEP_COST, Pace
+from reflowshock.fem.division.choose_levels import SUBSTEP_COST, StepLimits
 from reflowshock.fem.division.decide import decide_scheme, in_local_steps, in_path_levels, in_two_steps, plan_windows
 from reflowshock.fem.division.division import Choice, Division, Rules
 from reflowshock.fem.division.whole import Survey, Whole, nodes_of, seeds_of, touching
@@ -20,7 +20,7 @@ from reflowshock.fem.estimates.estimate import (
 
 # Fraction of coarse cells that may need less than the window: none, a few at the walls of holes, the finer half.
 EXCEPTIONS = (0.0, 0.02, 0.5)
-SHARES = (1.0, 1.0 / 1.5, 0.5)  # of these windows: on packages the largest is within 5 % of the best there is
+SHARES = (1.0, 1.0 / 1.5, 0.5)  # fractions of these windows to try; for packages the first is within 5 % of the best
 WINDOW_COST = WINDOW_OVERHEAD * UPDATES_PER_SECOND * BOARD_ADVANTAGE  # in updates of a box
 
 
@@ -32,12 +32,12 @@ def divide(whole: Whole, survey: Survey, rules: Rules) -> Division:
     """
     choice = scheme_for(whole, survey, rules)
     if rules.copied is not None and rules.copy is not None:
-        return replace(submodel(whole, survey, rules, rules.copied, rules.copy), why=choice.why)
+        return replace(divide_for_one_way(whole, survey, rules, rules.copied, rules.copy), why=choice.why)
     divided = {
-        "held_velocity": along_paths,
-        "impulse": carried,
-        "gravouil_combescure": at_ties,
-        "local_steps": by_levels,
+        "held_velocity": divide_for_held_velocity,
+        "impulse": divide_for_impulse,
+        "gravouil_combescure": divide_for_gravouil_combescure,
+        "local_steps": divide_for_local_steps,
     }
     return replace(divided[choice.scheme](whole, survey, rules), why=choice.why)
 
@@ -45,23 +45,24 @@ def divide(whole: Whole, survey: Survey, rules: Rules) -> Division:
 def scheme_for(whole: Whole, survey: Survey, rules: Rules) -> Choice:
     """Return the scheme for a mesh, with the reason; raises as ``decide_scheme``."""
     return decide_scheme(
-        rules, survey.step, bool(survey.linear.all()), lambda: bool(by_buffer(whole, survey, rules).macro.any())
+        rules, survey.step, bool(survey.linear.all()), lambda: bool(buffered_division(whole, survey, rules).macro.any())
     )
 
 
-def by_buffer(whole: Whole, survey: Survey, rules: Rules) -> Division:
-    """Return the division of held velocity: the meso model is all but the board, plus layers of board around it.
+def buffered_division(whole: Whole, survey: Survey, rules: Rules) -> Division:
+    """Return the division of held velocity: the meso model includes layers of board.
 
-    The window follows the macro model and all cells that touch the interface (PHYSICS 4).
+    These layers surround all cells that do not belong to the board. The window follows the macro model and all
+    cells that touch the interface (PHYSICS 4).
     """
     cells = whole.mesh.cells
-    buffer = grown(cells, seeds_of(whole, ~rules.coarse), rules.coarse, rules.coupling.buffer_layers)
-    return held(whole, survey, rules, ~rules.coarse | buffer)
+    buffer = grow_region(cells, seeds_of(whole, ~rules.coarse), rules.coarse, rules.coupling.buffer_layers)
+    return held_velocity_division(whole, survey, rules, ~rules.coarse | buffer)
 
 
-def along_paths(whole: Whole, survey: Survey, rules: Rules) -> Division:
-    """Return the division of ``by_buffer``, with levels in the meso model if no load or damping forbids them."""
-    division = by_buffer(whole, survey, rules)
+def divide_for_held_velocity(whole: Whole, survey: Survey, rules: Rules) -> Division:
+    """Return the buffered division, with levels in the meso model if no load or damping forbids them."""
+    division = buffered_division(whole, survey, rules)
     meso = nodes_of(whole.mesh.cells, division.meso, len(whole.mesh.points))
     pushed = rules.pushed or meso[list(rules.shaken)].any()
     if pushed:
@@ -72,22 +73,22 @@ def along_paths(whole: Whole, survey: Survey, rules: Rules) -> Division:
         nodes[whole.tie.slave[nodes[whole.tie.master].any(axis=1)]] = True
         return division.meso & touching(whole.mesh.cells, nodes)
 
-    pace = Pace(survey.step, survey.cost, division.plan.window, rules.fraction)
-    return in_path_levels(division, rules, pace, around)
+    limits = StepLimits(survey.step, survey.cost, division.plan.window, rules.fraction)
+    return in_path_levels(division, rules, limits, around)
 
 
-def carried(whole: Whole, survey: Survey, rules: Rules) -> Division:
+def divide_for_impulse(whole: Whole, survey: Survey, rules: Rules) -> Division:
     """Return the division of the impulse scheme: the cells of held velocity, the interface in the meso model."""
-    return replace(by_buffer(whole, survey, rules), scheme="impulse")
+    return replace(buffered_division(whole, survey, rules), scheme="impulse")
 
 
-def held(whole: Whole, survey: Survey, rules: Rules, meso: NDArray[np.bool_]) -> Division:
+def held_velocity_division(whole: Whole, survey: Survey, rules: Rules, meso: NDArray[np.bool_]) -> Division:
     """Return the division of held velocity for the cells of the meso model, shape (ne,)."""
     slow = ~meso | touching(whole.mesh.cells, cut_nodes(whole.mesh.cells, meso, len(whole.mesh.points)))
     return in_two_steps("held_velocity", ~meso, meso, plan_windows(rules, slow, survey.step))
 
 
-def submodel(
+def divide_for_one_way(
     whole: Whole, survey: Survey, rules: Rules, copied: NDArray[np.bool_], copy: NDArray[np.bool_]
 ) -> Division:
     """Return the division of one-way coupling: the meso model has the fine cells and layers of cells around them.
@@ -109,13 +110,16 @@ def cut_nodes(cells: NDArray[np.int32], meso: NDArray[np.bool_], count: int) -> 
     return nodes_of(cells, meso, count) & nodes_of(cells, ~meso, count)
 
 
-def at_ties(_whole: Whole, survey: Survey, rules: Rules) -> Division:
-    """Return the division of Gravouil-Combescure: the meso model is all but the board, coupled at the tied nodes."""
+def divide_for_gravouil_combescure(_whole: Whole, survey: Survey, rules: Rules) -> Division:
+    """Return the division of Gravouil-Combescure: the meso model is everything but the board.
+
+    Both models are coupled at the tied nodes.
+    """
     plan = plan_windows(rules, rules.coarse, survey.step)
     return in_two_steps("gravouil_combescure", rules.coarse, ~rules.coarse, plan)
 
 
-def by_levels(whole: Whole, survey: Survey, rules: Rules) -> Division:
+def divide_for_local_steps(whole: Whole, survey: Survey, rules: Rules) -> Division:
     """Return the division of local steps with the window and levels of least predicted cost.
 
     Raises:
@@ -143,8 +147,8 @@ def window_steps(coarse: NDArray[np.float64]) -> Iterator[float]:
 def levels_below(whole: Whole, survey: Survey, step: float, rules: Rules) -> Division:
     """Return the division in levels for a window from a critical step [s]; raises as ``choose_levels``."""
     plan = rules.plan(step, step)
-    pace = Pace(survey.step, survey.cost, plan.window, rules.fraction, rules.stiffness)
-    return in_local_steps(whole.mesh.cells, whole.tie, pace, plan, rules.coupling.most_levels)
+    limits = StepLimits(survey.step, survey.cost, plan.window, rules.fraction, rules.stiffness)
+    return in_local_steps(whole.mesh.cells, whole.tie, limits, plan, rules.coupling.most_levels)
 
 
 def predicted_cost(division: Division, cost: NDArray[np.float64]) -> float:
@@ -154,7 +158,7 @@ def predicted_cost(division: Division, cost: NDArray[np.float64]) -> float:
     return (updates + WINDOW_COST) / division.plan.window
 
 
-def grown(
+def grow_region(
     cells: NDArray[np.int32], seeds: NDArray[np.bool_], through: NDArray[np.bool_], layers: int
 ) -> NDArray[np.bool_]:
     """Return the cells of several layers around seed nodes, shape (ne,); each layer touches the previous one.

@@ -48,7 +48,7 @@ class Rules:
     def of_shock(
         cls, shock: Shock, coarse: NDArray[np.bool_], duration: float, *, sprung: bool, cooled: bool
     ) -> "Rules":
-        """Return the rules of a drop of ``duration`` [s]; ``cooled`` means that stress of cooling is at rest in it."""
+        """Return the rules of a drop of ``duration`` [s]; ``cooled``: with residual stress from cooling."""
         return cls(
             coupling=shock.coupling,
             coarse=coarse,

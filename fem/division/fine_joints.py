@@ -13,7 +13,7 @@ from reflowshock.fem.mesh.mesh import MeshData, append, select
 from reflowshock.fem.mesh.mesh_file import read_mesh, read_meshes
 from reflowshock.fem.mesh.watch_table import joint_names
 from reflowshock.fem.problem.inputs import PackageInput
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 
 KEY = "shock.coupling.fine_joints"
 
@@ -56,7 +56,7 @@ def with_coarse_joints(mesh: MeshData, coarse: MeshData, fine: Collection[str]) 
     joints, coarse_joints = joint_names(mesh), joint_names(coarse)
     unknown = sorted(set(fine) - set(joints))
     if unknown:
-        hint = nearest(unknown[0], joints)
+        hint = find_nearest(unknown[0], joints)
         question = f"; did you mean {hint}?" if hint else ""
         raise MeshError(f"{KEY}: the mesh has no joint {unknown[0]}, allowed: {', '.join(joints)}{question}")
     if not fine:

@@ -50,12 +50,12 @@ class FittedTable:
         return FittedTable(self.points.within(node, cell), bedded, (nodes[nodes >= 0], masses[nodes >= 0]))
 
 
-def fitted(mesh: MeshData, given: Fittings, symmetry: Sequence[str], slaves: NDArray, yields: bool) -> FittedTable:
+def fitted(mesh: MeshData, fittings: Fittings, symmetry: Sequence[str], slaves: NDArray, yields: bool) -> FittedTable:
     """Return the tables of the fittings of a mesh.
 
     Args:
         mesh: Mesh of the whole body.
-        given: Fittings of the input.
+        fittings: Fittings of the input.
         symmetry: Axes that are normal to a symmetry plane through the origin.
         slaves: Slave nodes, which follow their masters.
         yields: Whether plastic strain is watched.
@@ -66,22 +66,22 @@ def fitted(mesh: MeshData, given: Fittings, symmetry: Sequence[str], slaves: NDA
     """
     supports: dict[str, Support] = {
         name: (np.setdiff1d(facet_set(mesh, support.on), slaves), np.isin(list(AXES), support.hold))
-        for name, support in given.supports.items()
+        for name, support in fittings.supports.items()
     }
-    points = point_table(mesh, {name: point.at for name, point in given.watch.items()}, supports, yields)
+    points = point_table(mesh, {name: point.at for name, point in fittings.watch.items()}, supports, yields)
     return FittedTable(
-        points=replace(points, gauges=gauge_table(mesh, given.gauges, symmetry)),
-        bedded={name: outward_facets(mesh, item.on) for name, item in given.supports.items() if item.bedding},
-        masses=lumped_masses(mesh, given.masses, symmetry),
+        points=replace(points, gauges=gauge_table(mesh, fittings.gauges, symmetry)),
+        bedded={name: outward_facets(mesh, item.on) for name, item in fittings.supports.items() if item.bedding},
+        masses=lumped_masses(mesh, fittings.masses, symmetry),
     )
 
 
-def fitted_to(mesh: MeshData, chosen: NDArray[np.bool_], given: Fittings, yields: bool) -> FittedTable:
+def fit_to_mesh(mesh: MeshData, chosen: NDArray[np.bool_], fittings: Fittings, yields: bool) -> FittedTable:
     """Return the fittings of selected cells of a mesh, shape (ne,), such as the board; raises as ``fitted``."""
     body, number = selected_cells(mesh, chosen)
     symmetry = [axis for axis in AXES if len(body.facets_of(f"symmetry_{axis}"))]
     nodes, cells = np.flatnonzero(number >= 0).astype(np.int32), np.flatnonzero(chosen)
-    return fitted(body, given, symmetry, np.empty(0, np.int32), yields).within(nodes, cells, nodes)
+    return fitted(body, fittings, symmetry, np.empty(0, np.int32), yields).within(nodes, cells, nodes)
 
 
 def lumped_masses(mesh: MeshData, masses: Mapping[str, PointMass], symmetry: Sequence[str]) -> Shares:

@@ -19,28 +19,28 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.division.choose_levels import ROUNDING, SUBSTEP_COST, Pace
+from reflowshock.fem.division.choose_levels import ROUNDING, SUBSTEP_COST, StepLimits
 from reflowshock.fem.division.division import Division
 
 MOST_LEVELS = 3  # equal to ``kernels.levels.PACES``, which is not imported because ``plan`` loads no compiled code
 Around = Callable[[NDArray[np.bool_]], NDArray[np.bool_]]
 
 
-def with_path_levels(division: Division, pace: Pace, around: Around, most: int) -> Division:
+def with_path_levels(division: Division, limits: StepLimits, around: Around, most: int) -> Division:
     """Return a division of held velocity with the levels and substeps of least predicted cost.
 
     Args:
         division: Division with a single level.
-        pace: Critical steps and costs of all cells.
+        limits: Critical steps and costs of all cells.
         around: Function that returns the meso cells sharing a node with given cells, also through ties, shape (ne,).
         most: Largest number of levels.
     """
-    plan, finer = division.plan, FinerCells(division.meso, pace, around)
+    plan, finer = division.plan, FinerCells(division.meso, limits, around)
 
     def cost(ratios: tuple[int, ...]) -> float:
         counts = np.cumprod(ratios)
         level = finer.level(ratios)
-        return float(pace.cost @ np.array([0, *counts])[level]) + SUBSTEP_COST * float(counts.sum())
+        return float(limits.cost @ np.array([0, *counts])[level]) + SUBSTEP_COST * float(counts.sum())
 
     ratios = min(candidates(plan.substeps, min(MOST_LEVELS, most)), key=cost)
     return replace(division, level=finer.level(ratios), ratios=ratios, plan=replace(plan, substeps=math.prod(ratios)))
@@ -68,11 +68,11 @@ def opaque_ratio(fraction: float) -> float:
 class FinerCells:
     """Cells of the meso model that need smaller steps than a fraction of the window, with layers around them."""
 
-    def __init__(self, meso: NDArray[np.bool_], pace: Pace, around: Around) -> None:
+    def __init__(self, meso: NDArray[np.bool_], limits: StepLimits, around: Around) -> None:
         """Take the cells of the meso model, shape (ne,); other arguments as in ``with_path_levels``."""
         self._meso, self._around = meso, around
-        self._steps, self._window = pace.fraction * pace.steps, pace.window
-        self._opaque = opaque_ratio(pace.fraction)
+        self._steps, self._window = limits.fraction * limits.steps, limits.window
+        self._opaque = opaque_ratio(limits.fraction)
         self._cache: dict[int, NDArray[np.bool_]] = {}
 
     def than(self, count: int) -> NDArray[np.bool_]:

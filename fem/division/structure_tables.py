@@ -42,7 +42,7 @@ class StructureTables(Tables):
     pushed: dict[str, Shares]
     fitted: FittedTable
 
-    def counted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
+    def restricted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
         """Return facet sets and fittings in the numbers of a model."""
         return {
             "nodes_of": {name: present(node[nodes]) for name, nodes in self.nodes_of.items()},
@@ -60,7 +60,7 @@ class StructureTables(Tables):
         }
 
 
-def tied(mesh: MeshData, problem: StructureProblem) -> Whole:
+def tie_layers(mesh: MeshData, problem: StructureProblem) -> Whole:
     """Tie layers of a structure with different meshes.
 
     Raises:
@@ -110,7 +110,7 @@ def pushed_nodes(mesh: MeshData, problem: StructureProblem) -> dict[str, Shares]
 
 
 def check_layers(mesh: MeshData, problem: StructureProblem) -> None:
-    """Check that cells and parts of the mesh match elements and layers of the input; raises as ``tied``."""
+    """Check that cells and parts of the mesh match elements and layers of the input; raises as ``tie_layers``."""
     element = problem.structure.element
     if mesh.shape.nodes != NODES[element]:
         raise MeshError(
@@ -121,7 +121,7 @@ def check_layers(mesh: MeshData, problem: StructureProblem) -> None:
     if layers != parts:
         empty, foreign = ", ".join(sorted(layers - parts)), ", ".join(sorted(parts - layers))
         raise MeshError(
-            f"layers and parts of the mesh differ: layers without elements: {empty or 'none'}; parts that are no layer:"
+            f"layers and parts of the mesh differ: layers without elements: {empty or 'none'}; parts without a layer:"
             f" {foreign or 'none'}"
         )
 

@@ -56,13 +56,13 @@ class Tables:
     every: NDArray[np.int32]
 
     @classmethod
-    def undivided(cls, whole: Whole, held: NDArray[np.bool_], **own: Any) -> Self:
+    def undivided(cls, whole: Whole, held: NDArray[np.bool_], **fields: Any) -> Self:
         """Return the tables of a joined mesh as one model with one step.
 
         Args:
             whole: Mesh and ties.
             held: Fixed components, shape (n, 3).
-            own: Fields that a subclass adds.
+            fields: Fields that a subclass adds.
         """
         held_nodes = np.flatnonzero(held.any(axis=1))
         return cls(
@@ -78,10 +78,10 @@ class Tables:
             level=np.zeros(len(whole.mesh.cells), np.int32),
             ratios=(),
             every=np.ones(len(whole.mesh.cells), np.int32),
-            **own,
+            **fields,
         )
 
-    def counted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
+    def restricted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
         """Return the fields of a subclass restricted to one model.
 
         Args:
@@ -110,7 +110,7 @@ class JointTables(Tables):
 
     @classmethod
     def of(
-        cls, whole: Whole, rules: Mapping[str, Sequence[int]], layer: float, given: FittedTable | None = None
+        cls, whole: Whole, rules: Mapping[str, Sequence[int]], layer: float, fittings: FittedTable | None = None
     ) -> Self:
         """Return the tables of a package on a board.
 
@@ -118,7 +118,7 @@ class JointTables(Tables):
             whole: Joined mesh.
             rules: Fixed components by facet set, as in ``HELD``.
             layer: Thickness of the solder layer at the pads over which stress is averaged [m].
-            given: Fittings of the board, None without fittings.
+            fittings: Fittings of the board, None without fittings.
         """
         mesh = whole.mesh
         return cls.undivided(
@@ -127,10 +127,10 @@ class JointTables(Tables):
             watch=whole_watch(mesh, layer),
             shaken=mesh.facet_nodes("mounting_holes"),
             joint_interface=whole_joint_interface(mesh),
-            fitted=given or fitted(mesh, Fittings(), (), whole.tie.slave, yields=False),
+            fitted=fittings or fitted(mesh, Fittings(), (), whole.tie.slave, yields=False),
         )
 
-    def counted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
+    def restricted(self, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]) -> dict[str, Any]:
         """Return watch points, shaken nodes, joint interfaces and fittings in the numbers of a model."""
         return {
             "watch": self.watch.within(node, cell, part.number),
@@ -153,7 +153,7 @@ class ModelInput(Generic[TablesT_co]):
     cells: NDArray[np.intp]
 
 
-def joined(data: MeshData) -> Whole:
+def join_meshes(data: MeshData) -> Whole:
     """Merge the nodes of board and board patch, insert columns, and tie the joints.
 
     Raises:
@@ -167,7 +167,7 @@ def prepare(
     data: MeshData, division: Division | Literal["dns"], rules: Mapping[str, Sequence[int]] = HELD
 ) -> dict[Role, ModelInput[JointTables]]:
     """Join a mesh and split it into its models; see ``model_inputs``."""
-    return model_inputs(joined(data), division, rules)
+    return model_inputs(join_meshes(data), division, rules)
 
 
 def model_inputs(
@@ -175,7 +175,7 @@ def model_inputs(
     division: Division | Literal["dns"],
     rules: Mapping[str, Sequence[int]] = HELD,
     layer: float = JOINT_LAYER,
-    given: FittedTable | None = None,
+    fittings: FittedTable | None = None,
 ) -> dict[Role, ModelInput[JointTables]]:
     """Split a package on a board into its models; arguments as in ``JointTables.of``.
 
@@ -185,7 +185,7 @@ def model_inputs(
     Raises:
         MeshError: A pad has no solder, or the layer is thicker than a joint.
     """
-    tables = JointTables.of(whole, rules, layer, given)
+    tables = JointTables.of(whole, rules, layer, fittings)
     if division != "dns":
         return split(whole, tables, division)
     part = part_of(whole, np.ones(len(whole.mesh.cells), dtype=bool))
@@ -232,11 +232,11 @@ def part_input(
         nodes=part.nodes,
         level=np.zeros(len(part.mesh.cells), np.int32),
         every=np.ones(len(part.mesh.cells), np.int32),
-        **tables.counted(part, node, cell),
+        **tables.restricted(part, node, cell),
     )
     return ModelInput(part.mesh, restricted, np.flatnonzero(part.cell_number >= 0))
 
 
 def present(numbers: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the non-negative numbers, which belong to this model."""
+    """Return the numbers of nodes or cells that belong to this model, which are the non-negative ones."""
     return numbers[numbers >= 0]

@@ -113,7 +113,9 @@ def survey(mesh: MeshData, materials: Materials | Mapping[str, Material], treatm
     )
 
 
-def on_springs(survey: Survey, mesh: MeshData, table: FittedTable | None, supports: Mapping[str, Support]) -> Survey:
+def add_spring_stiffness(
+    survey: Survey, mesh: MeshData, table: FittedTable | None, supports: Mapping[str, Support]
+) -> Survey:
     """Return a survey with critical steps reduced by elastic supports."""
     added_frequency = np.zeros(len(survey.plain_step))  # squared circular frequency [1/s^2]
     for name, facets in table.bedded.items() if table else ():
@@ -138,7 +140,10 @@ def mass_factors(step: NDArray[np.float64], scaled: NDArray[np.bool_], treatment
     """
     target = min(float(step[~scaled].min(initial=np.inf)), treatment.scaled_step)
     if not np.isfinite(target):
-        raise StepError(f"numerics.mass_scaled = {tuple(treatment.mass_scaled)} leaves no role to take the step from")
+        raise StepError(
+            f"numerics.mass_scaled = {tuple(treatment.mass_scaled)} includes every role; omit at least one, whose"
+            " elements determine the step"
+        )
     return np.where(scaled, np.maximum(1.0, (target / step) ** 2), 1.0)
 
 

@@ -177,7 +177,7 @@ class ImplicitMotion(Motion):
         h, scheme = self.step, self._scheme
         self._update_force()
         right = (1.0 + scheme.alpha) * self._total_force() - scheme.alpha * before
-        self._right.array = right[self._equations.own]
+        self._right.array = right[self._equations.owned]
         self.factor.solve(self._right, self._solution)
         self._equations.spread(self._solution, self._acceleration)
         self.displacement += h**2 * scheme.beta * self._acceleration
@@ -188,7 +188,7 @@ class ImplicitMotion(Motion):
         self._update_force()
         before, self._before = self._before, self._balance_fields()
         change, mean = self._before - before, 0.5 * (before + self._before)
-        solved, prescribed = self._equations.own, self._prescribed & self.body.shared.owned[:, None]
+        solved, prescribed = self._equations.owned, self._prescribed & self.body.shared.owned[:, None]
         moved, held = change[0], mean[4] + mean[5]
         self._works[0] += float(mean[3][solved] @ moved[solved] - held[prescribed] @ moved[prescribed])
         self._works[1] -= float(np.sum((mean[4] * moved)[self.body.shared.owned])) + self._gain(change, mean)
@@ -205,7 +205,7 @@ class ImplicitMotion(Motion):
             change: Change of ``_balance_fields`` over the step, shape (6, n, 3).
             mean: Mean of ``_balance_fields`` over the step, shape (6, n, 3).
         """
-        h, scheme, solved = self.step, self._scheme, self._equations.own
+        h, scheme, solved = self.step, self._scheme, self._equations.owned
         if not scheme.alpha:
             return 0.0
         mass = (self.body.mass + self._extra)[:, None]

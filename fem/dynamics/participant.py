@@ -102,5 +102,5 @@ class SingleModel(Restartable):
 
 
 def explicit_motion(body: Body, loads: list[Load], step: float) -> ExplicitMotion:
-    """Return the explicit motion of a model without an interface, starting at rest."""
+    """Return the explicit motion of a model without an interface, starting at rest, with a time step [s]."""
     return ExplicitMotion(body, loads, step, np.empty(0, np.int32), np.zeros(len(body.mass)))

@@ -45,7 +45,7 @@ class OnePoint:
         mean = strain_matrix(geometry.gradient)
         weighted = geometry.volume[:, None, None] * elasticity[material]
         gamma, resistance = hourglass_control(corners, elasticity, material)
-        return mean.transpose(0, 2, 1) @ weighted @ mean + self.coefficient * transformed(gamma, resistance)
+        return mean.transpose(0, 2, 1) @ weighted @ mean + self.coefficient * transform_modes(gamma, resistance)
 
 
 def hourglass_control(
@@ -69,10 +69,10 @@ def hourglass_control(
     shape = HOURGLASS - centred @ (gradient.transpose(0, 2, 1) @ HOURGLASS)
     dual = shape @ np.linalg.inv(gamma.transpose(0, 2, 1) @ shape)
     stiffness = HEXAHEDRON.stiffness(corners, elasticity, material)
-    return gamma, transformed(dual.transpose(0, 2, 1), stiffness)
+    return gamma, transform_modes(dual.transpose(0, 2, 1), stiffness)
 
 
-def transformed(left: NDArray[np.float64], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+def transform_modes(left: NDArray[np.float64], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return A matrix A^T with A the Kronecker product of ``left`` and the 3 x 3 identity, shape (ne, 3m, 3m).
 
     Args:

@@ -17,7 +17,7 @@ from reflowshock.fem.problem.failure import Failure
 from reflowshock.fem.problem.kinematics import Kinematics, finite_rotation
 from reflowshock.materials.library import SAC405
 from reflowshock.materials.parameters import Material
-from reflowshock.parameters import changed
+from reflowshock.parameters import with_value
 
 NEGLIGIBLE_WEIGHT = 1e-3  # g over the peak acceleration below which gravity is neglected
 # Strip between immovable ends: the restoring force at the deflection w is k w (1 + 3 (w / t)^2), because the tension
@@ -176,10 +176,10 @@ class SolderPlasticity(DropEffect):
         why = f"shock.numerics.plasticity = {run.shock.numerics.plasticity}"
         return decision(bool(laws), "; ".join([why, *(yields(name, law) for name, law in laws.items())]))
 
-    def other_way(self, case: Any, acts: bool) -> Any:
+    def toggled(self, case: Any, acts: bool) -> Any:
         """Return the case of a package with elastic solder if it is plastic, else with plastic solder."""
-        with_law = case if acts or case.materials.solder.plasticity else changed(case, "materials.solder", SAC405)
-        return changed(with_law, "shock.numerics.plasticity", "off" if acts else "on")
+        with_law = case if acts or case.materials.solder.plasticity else with_value(case, "materials.solder", SAC405)
+        return with_value(with_law, "shock.numerics.plasticity", "off" if acts else "on")
 
 
 class RayleighEffect(DropEffect):

@@ -130,7 +130,7 @@ def implicit_plan(plan: WindowPlan, largest: float) -> WindowPlan:
     return WindowPlan(spacing, math.ceil(spacing / largest), plan.windows // plan.stride, 1)
 
 
-def shortened(plan: WindowPlan, duration: float) -> WindowPlan:
+def shorten_plan(plan: WindowPlan, duration: float) -> WindowPlan:
     """Return a plan cut after the first sample at or after a duration [s]."""
     samples = math.ceil(duration / (plan.stride * plan.window) * (1.0 - ROUNDING))
     return replace(plan, windows=min(plan.windows, plan.stride * samples))

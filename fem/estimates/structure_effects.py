@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from reflowshock.effect import Decision, Effect, Toggle, decided, decision
+from reflowshock.effect import Decision, Effect, Toggle, decide_all, decision
 from reflowshock.fem.estimates.material_effects import MATERIAL_EFFECTS, MaterialEffect
 from reflowshock.fem.problem.kinematics import finite_rotation
 from reflowshock.fem.problem.load_kinds import KINDS, Pulsed
@@ -114,4 +114,4 @@ STRUCTURE_EFFECTS: tuple[Effect[MotionScene] | MaterialEffect, ...] = (
 
 def effects(problem: StructureProblem, added_mass: float, neglected_strain: float | None = None) -> dict[str, Decision]:
     """Decide on the effects of a structure; arguments as the attributes of ``MotionScene``."""
-    return decided(STRUCTURE_EFFECTS, MotionScene(problem, added_mass, neglected_strain))
+    return decide_all(STRUCTURE_EFFECTS, MotionScene(problem, added_mass, neglected_strain))

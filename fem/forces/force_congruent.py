@@ -50,7 +50,7 @@ class CongruentElements:
     @classmethod
     def build(cls, elements: Elements) -> "CongruentElements":
         """Group boxes (``is_box``) into classes and rows, and diagonalise the stiffness of each class."""
-        ahead, axes, box_rows, first = arranged(elements)
+        ahead, axes, box_rows, first = arrange_in_rows(elements)
         blocks = parity_blocks(element_stiffness(ahead.subset(first)))
         lines = np.zeros((2, 3, len(box_rows.nodes) + PAD))
         return cls(np.array(axes), box_rows.nodes, box_rows.rows, blocks, lines, MeanStrain.of(elements))
@@ -71,17 +71,17 @@ class CongruentElements:
         return linear_energy(self, displacement, self.mean)
 
 
-def arranged(elements: Elements) -> tuple[Elements, tuple[int, int, int], BoxRows, NDArray[np.int64]]:
+def arrange_in_rows(elements: Elements) -> tuple[Elements, tuple[int, int, int], BoxRows, NDArray[np.int64]]:
     """Return boxes in the frame with the longest rows, the axes of that frame, the rows, and a box of each shape."""
-    first, shape = classes(replace(aligned(elements), density=np.zeros(len(elements.cells))))
+    first, shape = classes(replace(align_boxes(elements), density=np.zeros(len(elements.cells))))
     candidates = []
     for axes in TURNS:
-        ahead = aligned(turned(elements, axes))
+        ahead = align_boxes(turn_elements(elements, axes))
         candidates.append((ahead, axes, BoxRows.find(ahead.points, ahead.cells, shape)))
     return *min(candidates, key=lambda candidate: len(candidate[2].rows)), first
 
 
-def turned(elements: Elements, axes: tuple[int, int, int]) -> Elements:
+def turn_elements(elements: Elements, axes: tuple[int, int, int]) -> Elements:
     """Return elements in a frame whose directions are the coordinate directions ``axes``."""
     voigt = [VOIGT.index((min(axes[i], axes[j]), max(axes[i], axes[j]))) for i, j in VOIGT]
     elasticity = np.ascontiguousarray(elements.elasticity[:, voigt][:, :, voigt])
@@ -107,7 +107,7 @@ def in_rows(elements: Elements) -> NDArray[np.bool_]:
     return box if box.all() or np.sum(box) >= FEW else np.zeros_like(box)
 
 
-def aligned(elements: Elements) -> Elements:
+def align_boxes(elements: Elements) -> Elements:
     """Return boxes renumbered so that bit d of a local index is the side in coordinate direction d."""
     corners = elements.points[elements.cells]
     upper = corners > 0.5 * (corners.min(axis=1, keepdims=True) + corners.max(axis=1, keepdims=True))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from reflowshock.fem.elements.element import Elements, classes, element_stiffness
 from reflowshock.fem.errors import InvertedElementError
 from reflowshock.fem.forces.energy import Energy
-from reflowshock.fem.forces.force_congruent import aligned, arranged, is_box, parity_blocks
+from reflowshock.fem.forces.force_congruent import align_boxes, arrange_in_rows, is_box, parity_blocks
 from reflowshock.fem.forces.nonlinear_blocks import hexahedron_constants, in_blocks
 from reflowshock.fem.kernels.box_rotation import (
     UPRIGHT,
@@ -68,7 +68,7 @@ class CorotationalBoxes:
     def build(cls, everything: Elements, chosen: NDArray[np.int64]) -> "CorotationalBoxes":
         """Group the ``chosen (ne,)`` elements, boxes (``force_congruent.is_box``), into shapes and rows."""
         elements = everything.subset(chosen)
-        ahead, axes, box_rows, first = arranged(elements)
+        ahead, axes, box_rows, first = arrange_in_rows(elements)
         shapes = ahead.subset(first)
         size = np.ptp(shapes.points[shapes.cells], axis=1)
         lines = np.zeros((2, 3, len(box_rows.nodes) + PAD))
@@ -109,7 +109,7 @@ class CorotationalBoxes:
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return the strain energy."""
         read_lines(self.nodes, self.axes, displacement, self.lines[0])
-        return accounted(row_energies(self.rows, self.scales, self.constants, self.lines[0]), self.hourglass)
+        return split_energies(row_energies(self.rows, self.scales, self.constants, self.lines[0]), self.hourglass)
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,7 +178,7 @@ class TurningBlocks:
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return the strain energy."""
-        return accounted(self.energies(self.cells, self.filled, self.constants, displacement), self.hourglass)
+        return split_energies(self.energies(self.cells, self.filled, self.constants, displacement), self.hourglass)
 
 
 class CorotationalBlocks(TurningBlocks):
@@ -191,7 +191,7 @@ class CorotationalBlocks(TurningBlocks):
     @staticmethod
     def ordered(elements: Elements) -> Elements:
         """Return the boxes renumbered so that bit d of a local index is the side in direction d."""
-        return aligned(elements)
+        return align_boxes(elements)
 
     @staticmethod
     def constants_of(shapes: Elements) -> NDArray[np.float64]:
@@ -230,7 +230,7 @@ def corotational_boxes(everything: Elements, chosen: NDArray[np.int64]) -> Corot
     return rows if len(chosen) >= SHORT_ROWS * len(rows.rows) else CorotationalBlocks.build(everything, chosen)
 
 
-def accounted(energies: tuple[float, float], hourglass: bool) -> Energy:
+def split_energies(energies: tuple[float, float], hourglass: bool) -> Energy:
     """Return the energies of mean strains and higher modes [J] as strain energy, the latter optionally as hourglass."""
     mean, higher = energies
     return Energy(strain=mean, hourglass=higher) if hourglass else Energy(strain=mean + higher)

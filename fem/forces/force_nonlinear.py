@@ -23,11 +23,11 @@ from reflowshock.fem.errors import InvertedElementError
 from reflowshock.fem.forces.energy import Energy
 from reflowshock.fem.forces.nonlinear_blocks import (
     Lanes,
-    alike,
     arrange,
     gauss_volumes,
     gradient_blocks,
     hexahedron_blocks,
+    merge_equal_materials,
     one_point_blocks,
 )
 from reflowshock.fem.kernels.lanes import LANES
@@ -87,7 +87,7 @@ class NonlinearElements:
             path: Kinematics and time step.
         """
         elements = everything.subset(chosen)
-        same, laws = alike(elements, plastic)
+        same, laws = merge_equal_materials(elements, plastic)
         lanes, finite = arrange(same, same.material), path.finite
         blocks: AnyBlocks
         kernel: Callable[[NDArray[np.float64], NDArray[np.float64]], int]
@@ -138,7 +138,7 @@ class NonlinearElements:
         """Return the history by element for a checkpoint; ``cells`` are the global numbers of this rank's elements."""
         block, lane = np.nonzero(self.lanes.valid)
         numbers = cells[self.numbers[self.lanes.element[block, lane]]]
-        return {name: Rows(numbers, by_lane(values)[block, lane]) for name, values in self.history.items()}
+        return {name: Rows(numbers, view_by_lane(values)[block, lane]) for name, values in self.history.items()}
 
     def restore(self, state: Mapping[str, NDArray[np.float64]]) -> None:
         """Set the history from the values that ``state`` returned, also in lanes that repeat an element."""
@@ -146,7 +146,7 @@ class NonlinearElements:
         row = np.empty(len(self.numbers), np.int64)
         row[self.lanes.element[block, lane]] = np.arange(len(block))
         for name, values in self.history.items():
-            by_lane(values)[...] = state[name][row[self.lanes.element]]
+            view_by_lane(values)[...] = state[name][row[self.lanes.element]]
 
     def located(self, indices: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return block and lane, each of shape (k,), of elements with ``indices (k,)`` into ``elements``."""
@@ -171,12 +171,12 @@ class NonlinearElements:
             return 1.0
         if isinstance(blocks, HexahedronBlocks):
             positions = (
-                by_lane(values)[row, lane]
+                view_by_lane(values)[row, lane]
                 for values, row in ((blocks.place, block), (blocks.corners, blocks.pattern[block]))
             )
             now, rest = (gauss_volumes(position.reshape(-1, 7, 3)) for position in positions)
             return now / rest
-        stretch = by_lane(blocks.state)[block, lane][..., 7:13]
+        stretch = view_by_lane(blocks.state)[block, lane][..., 7:13]
         return np.linalg.det(symmetric(stretch.reshape(-1, 6))).reshape(stretch.shape[:-1])
 
     def means(self, indices: NDArray[np.integer]) -> "Means":
@@ -201,7 +201,7 @@ class NonlinearElements:
         """Copy the history of elements of another term; block and lane from its ``located``, in this term's order."""
         order = self.lanes.element
         for name, values in self.history.items():
-            by_lane(values)[...] = by_lane(other.history[name])[block[order], lane[order]]
+            view_by_lane(values)[...] = view_by_lane(other.history[name])[block[order], lane[order]]
 
     def inverted(self, block: int, displacement: NDArray[np.float64]) -> InvertedElementError:
         """Return the error that names the worst element of a block."""
@@ -256,7 +256,7 @@ class Means:
     plastic_work: NDArray[np.float64]
 
 
-def by_lane(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def view_by_lane(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return a view with the lanes as second axis, ``(nb, 16, ...)``, of an array of blocks with lanes innermost."""
     split = values.reshape(*values.shape[:-1], -1, LANES)
     return np.moveaxis(split, -1, 1)

@@ -76,7 +76,7 @@ def in_blocks(order: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.i
     return order[np.minimum(padded, len(order) - 1)].reshape(-1, LANES), filled.astype(np.int32)
 
 
-def alike(elements: Elements, plastic: NDArray[np.float64]) -> tuple[Elements, NDArray[np.float64]]:
+def merge_equal_materials(elements: Elements, plastic: NDArray[np.float64]) -> tuple[Elements, NDArray[np.float64]]:
     """Return elements and plastic constants ``(nm, 6)`` with equal materials merged, since many parts share one."""
     constants = np.column_stack([elements.elasticity.reshape(len(plastic), -1), plastic])
     _, first, material = np.unique(constants, axis=0, return_index=True, return_inverse=True)

@@ -49,9 +49,9 @@ def read_modes(faces, start, w):
     """Write the modes of the boxes ``start`` to ``start + 15`` of a row from the face values at its nodes.
 
     Args:
-        faces: Face values of three components, see ``box_rows.transform_lines``, shape (12 * WIDTH,).
+        faces: Face values of three components [m], see ``box_rows.transform_lines``, shape (12 * WIDTH,).
         start: First of the sixteen boxes in the row.
-        w: Workspace whose modes are written.
+        w: Flat workspace of ``TURNED_SLOTS`` entries; its first 384 entries are written.
     """
     for k in range(4):
         values, modes = faces[k * WIDTH + FIRST + start :], w[6 * LANES * k :]
@@ -68,7 +68,7 @@ def add_faces(w, start, count, faces):
     """Add the forces on the modes of boxes of a row to the face values at its nodes, the transpose of ``read_modes``.
 
     Args:
-        w: Workspace with the forces on the modes of sixteen boxes.
+        w: Flat workspace with the forces [N] on the modes of sixteen boxes.
         start: First of these boxes in the row.
         count: Number of these boxes that are added; the others repeat the last box of the row.
         faces: Face forces of three components, shape (12 * WIDTH,) [N], added to.
@@ -89,7 +89,11 @@ def add_faces(w, start, count, faces):
 
 @njit(**LANE_OPTIONS)
 def transform_corners(w):
-    """Replace the values of three components at eight corners by their Walsh-Hadamard transform."""
+    """Replace the values at eight corners of sixteen elements by their Walsh-Hadamard transform, in place.
+
+    Args:
+        w: Flat array; component c at corner a of element e at ``16 * (3 a + c) + e`` becomes that of parity a.
+    """
     for component in range(3):
         v = w[LANES * component :]
         for lane in range(LANES):
@@ -104,7 +108,12 @@ def transform_corners(w):
 
 @njit(**LANE_OPTIONS)
 def write_deformation(k, w):
-    """Write F of sixteen boxes; the scales in ``k``, -1 / (4 h) along each direction, convert modes to gradients."""
+    """Write the mean deformation gradients F of sixteen boxes.
+
+    Args:
+        k: Constants as in ``spread_shape``; reads the scales -1 / (4 h) [1/m], which convert modes to gradients.
+        w: Flat workspace; reads the modes [m], writes F at ``DEFORMATION``.
+    """
     for lane in range(LANES):
         scale, x, y, z = three(k, SCALE + lane), three(w, X + lane), three(w, Y + lane), three(w, Z + lane)
         f = (
@@ -117,7 +126,12 @@ def write_deformation(k, w):
 
 @njit(**LANE_OPTIONS)
 def stress(k, u):
-    """Return T = V C : (U - 1), six entries; ``k`` begins with C_xx, C_yy, C_zz, C_xy, C_yz, C_xz, G_xy, G_yz, G_xz."""
+    """Return the stress times volume T = V C : (U - 1) as six scalars xx, yy, zz, xy, yz, xz [J].
+
+    Args:
+        k: At least nine scalars: V times C_xx, C_yy, C_zz, C_xy, C_yz, C_xz, G_xy, G_yz, G_xz [J].
+        u: Stretch U, six scalars.
+    """
     x, y, z = u[0] - 1.0, u[1] - 1.0, u[2] - 1.0
     return (
         k[0] * x + k[3] * y + k[5] * z,
@@ -131,7 +145,10 @@ def stress(k, u):
 
 @njit(**LANE_OPTIONS)
 def resistance(k, a, b, c, d):
-    """Return Q^ of the modes xy, xz, yz, xyz; ``k`` from entry 9 on as ``box_constants``."""
+    """Return the forces Q^ [N] on the modes xy, xz, yz, xyz of a box, four tuples of three scalars.
+
+    ``k`` are 27 constants of ``box_constants``; ``a`` to ``d`` the amplitudes of the modes, three scalars each [m].
+    """
     return (
         (k[18] * a[0] + k[19] * c[2], k[15] * a[1] + k[16] * b[2], k[11] * c[0] + k[13] * b[1] + k[14] * a[2]),
         (k[21] * b[0] + k[22] * c[1], k[10] * c[0] + k[12] * b[1] + k[13] * a[2], k[16] * a[1] + k[17] * b[2]),
@@ -142,7 +159,7 @@ def resistance(k, a, b, c, d):
 
 @njit(**LANE_OPTIONS)
 def add_cross(m, a, b):
-    """Return m + a x b."""
+    """Return m + a x b of three vectors as three scalars."""
     return (
         m[0] + a[1] * b[2] - a[2] * b[1],
         m[1] + a[2] * b[0] - a[0] * b[2],
@@ -152,7 +169,7 @@ def add_cross(m, a, b):
 
 @njit(**LANE_OPTIONS)
 def spin(u, moment):
-    """Return w of (tr(U) 1 - U) w = moment."""
+    """Return the vector w that solves (tr(U) 1 - U) w = moment, three scalars; ``u`` is U as xx, yy, zz, xy, yz, xz."""
     t = u[1] + u[2], u[0] + u[2], u[0] + u[1], -u[3], -u[4], -u[5]
     c = cofactor_symmetric(t)
     s = 1.0 / (t[0] * c[0] + t[3] * c[3] + t[5] * c[5])
@@ -161,7 +178,12 @@ def spin(u, moment):
 
 @njit(**LANE_OPTIONS)
 def resist(k, w):
-    """Replace the higher modes of sixteen boxes by Q^ and write their moments q^ x Q^ to mode 0, given R."""
+    """Replace the higher modes of sixteen boxes by the forces Q^ [N], and write their moments q^ x Q^ to mode 0.
+
+    Args:
+        k: Constants as in ``spread_shape``.
+        w: Flat workspace with modes and R.
+    """
     for lane in range(LANES):
         back = transposed(nine(w, ROTATION + lane))
         a, b = applied(back, three(w, XY + lane)), applied(back, three(w, XZ + lane))
@@ -177,7 +199,7 @@ def resist(k, w):
 
 @njit(**LANE_OPTIONS)
 def write_stress(k, w):
-    """Replace F of sixteen boxes by P, given R and the moments of their higher modes."""
+    """Replace F of sixteen boxes in workspace ``w`` by P [J], given R and the moments; ``k`` as in ``resist``."""
     for lane in range(LANES):
         r, higher = nine(w, ROTATION + lane), three(w, lane)
         u = stretch(r, nine(w, DEFORMATION + lane))
@@ -190,7 +212,7 @@ def write_stress(k, w):
 
 @njit(**LANE_OPTIONS)
 def write_linear_forces(k, w):
-    """Write the forces on the constant and linear modes of sixteen boxes, given P."""
+    """Write the forces [N] on constant and linear modes of 16 boxes, given P [J] in ``w``; ``k`` as in ``resist``."""
     for lane in range(LANES):
         p, scale = nine(w, DEFORMATION + lane), three(k, SCALE + lane)
         put_three(w, lane, (0.0, 0.0, 0.0))
@@ -201,7 +223,7 @@ def write_linear_forces(k, w):
 
 @njit(**LANE_OPTIONS)
 def turn_higher(w):
-    """Rotate Q^ of sixteen boxes by R."""
+    """Rotate the forces Q^ on the higher modes of sixteen boxes in workspace ``w`` by R, in place."""
     for lane in range(LANES):
         r = nine(w, ROTATION + lane)
         put_three(w, XY + lane, applied(r, three(w, XY + lane)))
@@ -212,10 +234,10 @@ def turn_higher(w):
 
 @njit(cache=True)
 def replace_by_forces(k, w):
-    """Replace the modes of sixteen boxes by the forces on them, given F and R; ``k (480,)`` as in ``spread_shape``.
+    """Replace the modes [m] of sixteen boxes in workspace ``w`` by the forces on them [N], given F and R.
 
     The loops are short and unrolled: with too many accesses, or calls too large to be inlined, the compiler does not
-    vectorise them, and the force takes three times as long.
+    vectorise them, and the force takes three times as long. ``k`` as in ``spread_shape``.
     """
     resist(k, w)
     write_stress(k, w)
@@ -225,13 +247,19 @@ def replace_by_forces(k, w):
 
 @njit(**LANE_OPTIONS)
 def own_constants(k, lane):
-    """Return the 27 constants of a lane."""
+    """Return the 27 constants of one of sixteen boxes as scalars; ``k`` as in ``spread_shape``, ``lane`` 0 to 15."""
     return nine(k, lane) + nine(k, 9 * LANES + lane) + nine(k, 18 * LANES + lane)
 
 
 @njit(cache=True)
 def spread_shape(constants, scale, k):
-    """Give sixteen lanes ``k (480,)`` the constants (27) and scales (3) of one shape."""
+    """Copy the constants of one shape to sixteen boxes.
+
+    Args:
+        constants: Constants of ``force_corotational.box_constants``, shape (27,) [J, N/m].
+        scale: -1 / (4 h) along each direction, shape (3,) [1/m].
+        k: Written: constants, scales; entry i of box e at ``16 * i + e``, shape (480,).
+    """
     for i in range(27):
         k[LANES * i : LANES * (i + 1)] = constants[i]
     for i in range(3):
@@ -240,7 +268,13 @@ def spread_shape(constants, scale, k):
 
 @njit(cache=True)
 def box_energies(w, lane, k):
-    """Return the energies [J] of the mean strains and of the higher modes of a lane with 27 constants."""
+    """Return the energies of the mean strain and of the higher modes of one box, two scalars [J].
+
+    Args:
+        w: Flat workspace with modes, F and R of sixteen boxes.
+        lane: Number of the box, 0 to 15.
+        k: Its 27 constants, see ``own_constants``.
+    """
     higher, r = 0.0, nine(w, ROTATION + lane)
     u, back = stretch(r, nine(w, DEFORMATION + lane)), transposed(r)
     t = stress(k[:9], u)
@@ -256,7 +290,7 @@ def box_energies(w, lane, k):
 
 @njit(cache=True)
 def repeat_last(w, count):
-    """Copy the modes of lane ``count - 1`` to all following lanes."""
+    """Copy the modes of box ``count - 1`` in workspace ``w`` to all following boxes of the sixteen."""
     for slot in range(0, DEFORMATION, LANES):
         for lane in range(count, LANES):
             w[slot + lane] = w[slot + count - 1]
@@ -264,17 +298,17 @@ def repeat_last(w, count):
 
 @njit(cache=True)
 def add_turned_row_forces(rows, scales, constants, displacement, force):
-    """Add the internal force of rows of boxes.
+    """Add the internal force of rows of equal corotational boxes; the caller subtracts it.
 
     Args:
         rows: ``(nr, 6)`` int32 as in ``kernels.box_rows.add_row_forces``.
         scales: ``(ns, 3)`` [1/m] per shape, -1 / (4 h) along each direction.
         constants: ``(ns, 27)`` per shape, see ``force_corotational.box_constants``.
-        displacement: ``(3, >= p + PAD)`` [m] at the positions.
-        force: The same [N], added to.
+        displacement: Displacement at the positions of the lines, shape (3, >= p + PAD) [m].
+        force: Force at the positions, shape (3, >= p + PAD) [N], added to.
 
     Returns:
-        ``UPRIGHT``, or the first row with a box that is turned inside out; then the force is not complete.
+        ``UPRIGHT`` (-1), or the first row with a box that is turned inside out; then the force is not complete.
     """
     faces, forces, w = np.zeros((3, 4, WIDTH)), np.zeros((3, 4, WIDTH)), np.zeros(TURNED_SLOTS)
     k = np.empty(SCALE + 3 * LANES)
@@ -299,7 +333,7 @@ def add_turned_row_forces(rows, scales, constants, displacement, force):
 
 @njit(cache=True)
 def row_energies(rows, scales, constants, displacement):
-    """Return the energies [J] of mean strains and higher modes; arguments as ``add_turned_row_forces``."""
+    """Return total energies of mean strains and higher modes [J]; arguments as in ``add_turned_row_forces``."""
     faces, w, k = np.zeros((3, 4, WIDTH)), np.zeros(TURNED_SLOTS), np.empty(SCALE + 3 * LANES)
     mean = higher = 0.0
     for r in range(len(rows)):
@@ -321,18 +355,18 @@ def row_energies(rows, scales, constants, displacement):
 
 @njit(cache=True)
 def add_turned_block_forces(cells, filled, constants, displacement, force):
-    """Subtract the internal force of boxes of any shapes.
+    """Subtract the internal force of corotational boxes of any shapes.
 
     Args:
-        cells: ``(nb, 8, 16)`` int32 nodes, bit d of a corner's number is its side in direction d; lanes past the last
-            box repeat it.
-        filled: ``(nb,)`` int32 boxes of each block.
-        constants: ``(nb, 480)`` of each lane what ``force_corotational.box_constants`` returns, then its scales [1/m].
-        displacement: ``(n, 3)`` [m].
-        force: ``(n, 3)`` [N], added to.
+        cells: ``(nb, 8, 16)`` int32 nodes of blocks of 16 boxes; bit d of a corner's number is its side in direction d;
+            boxes after the last one repeat it.
+        filled: ``(nb,)`` int32 number of boxes of each block.
+        constants: ``(nb, 480)``, each block as ``k`` of ``spread_shape``.
+        displacement: Nodal displacement, shape (n, 3) [m].
+        force: Nodal force, shape (n, 3) [N], subtracted from.
 
     Returns:
-        ``UPRIGHT``, or the first block with a box that is turned inside out; then the force is not complete.
+        ``UPRIGHT`` (-1), or the first block with a box that is turned inside out; then the force is not complete.
     """
     w = np.empty(TURNED_SLOTS)
     for b in range(len(cells)):
@@ -349,7 +383,7 @@ def add_turned_block_forces(cells, filled, constants, displacement, force):
 
 @njit(cache=True)
 def block_energies(cells, filled, constants, displacement):
-    """Return the energies [J] of mean strains and higher modes; arguments as ``add_turned_block_forces``."""
+    """Return total energies of mean strains and higher modes [J]; arguments as in ``add_turned_block_forces``."""
     w = np.zeros(TURNED_SLOTS)
     mean = higher = 0.0
     for b in range(len(cells)):

@@ -27,7 +27,14 @@ COLUMNS = LONGEST + 3 * LANES
 
 @njit(cache=True)
 def read_lines(nodes, axes, values, lines):
-    """Copy ``values (n, 3)`` at ``nodes (p,)`` into ``lines (3, >= p)``, components in the order of ``axes``."""
+    """Copy nodal vectors into lines of nodes, component by component.
+
+    Args:
+        nodes: Node at each position of the lines, shape (p,).
+        axes: Coordinate directions 0 to 2 in the order of the frame of the rows, shape (3,).
+        values: Nodal vectors, such as displacements [m], shape (n, 3).
+        lines: Written: component c of position i at ``lines[c, i]`` is ``values[nodes[i], axes[c]]``, shape (3, >= p).
+    """
     x, y, z = axes[0], axes[1], axes[2]
     for p in range(len(nodes)):
         node = nodes[p]
@@ -38,7 +45,14 @@ def read_lines(nodes, axes, values, lines):
 
 @njit(cache=True)
 def subtract_lines(nodes, axes, lines, values):
-    """Subtract lines from the rows of ``values (n, 3)`` at ``nodes (p,)``, and zero them."""
+    """Subtract lines of nodes from nodal vectors, and zero the lines; the reverse of ``read_lines``.
+
+    Args:
+        nodes: Node at each position of the lines, shape (p,).
+        axes: Coordinate directions 0 to 2 in the order of the frame of the rows, shape (3,).
+        lines: Values at the positions, such as forces [N], shape (3, >= p), zeroed.
+        values: Nodal vectors, shape (n, 3), subtracted from.
+    """
     x, y, z = axes[0], axes[1], axes[2]
     for p in range(len(nodes)):
         node = nodes[p]
@@ -50,7 +64,14 @@ def subtract_lines(nodes, axes, lines, values):
 
 @njit(inline="always")
 def transform_lines(line, starts, count, faces):
-    """Write the transform of one component ``line (p,)`` over the four lines of a row: ``faces (4, .)``."""
+    """Compute the Walsh-Hadamard transform of one component over the four lines of a row.
+
+    Args:
+        line: Component at all positions of the lines, shape (>= p,).
+        starts: Positions at which the four lines of the row begin, second direction first, shape (4,).
+        count: Number of nodes along the row.
+        faces: Written: transform of parity k at node i at ``faces[k, FIRST + i]``, shape (4, >= FIRST + count).
+    """
     a, b = line[starts[0] : starts[0] + count], line[starts[1] : starts[1] + count]
     c, d = line[starts[2] : starts[2] + count], line[starts[3] : starts[3] + count]
     t0, t1, t2, t3 = faces[0, FIRST:], faces[1, FIRST:], faces[2, FIRST:], faces[3, FIRST:]
@@ -61,7 +82,14 @@ def transform_lines(line, starts, count, faces):
 
 @njit(inline="always")
 def add_transform(faces, starts, count, line):
-    """Add the transform of ``faces (4, .)`` to one component of the four lines of a row."""
+    """Add the Walsh-Hadamard transform of face values to one component of the four lines of a row.
+
+    Args:
+        faces: Value of parity k at node i at ``faces[k, FIRST + i]``, shape (4, >= FIRST + count).
+        starts: Positions at which the four lines of the row begin, shape (4,).
+        count: Number of nodes along the row.
+        line: Component at all positions of the lines, shape (>= p,), added to.
+    """
     a, b = line[starts[0] : starts[0] + count], line[starts[1] : starts[1] + count]
     c, d = line[starts[2] : starts[2] + count], line[starts[3] : starts[3] + count]
     t0, t1, t2, t3 = faces[0, FIRST:], faces[1, FIRST:], faces[2, FIRST:], faces[3, FIRST:]
@@ -75,7 +103,16 @@ def add_transform(faces, starts, count, line):
 
 @njit(inline="always")
 def couple_inner(pair, k, count, faces, forces):
-    """Write the face forces of parity k at the inner nodes of a row: lanes 1 to at least ``count - 1``."""
+    """Write the face forces of one parity at the inner nodes of a row: equations of the module.
+
+    Args:
+        pair: Even and odd block E and O of the parity, entries 00 01 02 11 12 22, shape (2, 6) [N/m].
+        k: Parity across the row, 0 to 3.
+        count: Number of boxes in the row.
+        faces: Transformed displacements, component by parity by node (first node at column FIRST), shape (3, 4,
+            COLUMNS) [m].
+        forces: Transformed forces in the same order [N]; nodes 1 to ``count - 1`` are written, up to whole vectors.
+    """
     e, o = pair[0], pair[1]
     x, y, z = faces[0, k, FIRST:], faces[1, k ^ 1, FIRST:], faces[2, k ^ 2, FIRST:]
     fx, fy, fz = forces[0, k, LANES:], forces[1, k ^ 1, LANES:], forces[2, k ^ 2, LANES:]
@@ -92,7 +129,15 @@ def couple_inner(pair, k, count, faces, forces):
 
 @njit(inline="always")
 def couple_ends(pair, k, count, faces, forces):
-    """Write the face forces of parity k at the two end nodes of a row, which only the first or last box has."""
+    """Write the face forces of one parity at the first and last node of a row, which belong to one box only.
+
+    Args:
+        pair: As in ``couple_inner``.
+        k: As in ``couple_inner``.
+        count: As in ``couple_inner``.
+        faces: As in ``couple_inner``.
+        forces: Transformed forces, shape (3, 4, COLUMNS) [N]; nodes 0 and ``count`` are written.
+    """
     e, o = pair[0], pair[1]
     x, y, z = faces[0, k], faces[1, k ^ 1], faces[2, k ^ 2]
     for end in range(2):
@@ -107,14 +152,16 @@ def couple_ends(pair, k, count, faces, forces):
 
 @njit(cache=True, fastmath=FINITE)
 def add_row_forces(rows, blocks, displacement, force):
-    """Add K u of rows of boxes.
+    """Add K u of rows of equal boxes.
 
     Args:
-        rows: ``(nr, 6)`` int32: positions at which the four lines of a row begin (second direction first), number of
-            boxes, index into ``blocks``.
-        blocks: ``(ns, 8, 6)`` [N/m] per shape and parity, symmetric storage, divided by 8.
-        displacement: ``(3, >= p + PAD)`` [m] at the positions; finite in the padding.
-        force: The same [N], added to.
+        rows: Positions at which the four lines of nodes of each row begin (second direction first), number of boxes (at
+            most ``LONGEST``), index into ``blocks``; shape (nr, 6) int32.
+        blocks: Stiffness blocks of each shape and parity, entries 00 01 02 11 12 22, divided by 8, shape (ns, 8, 6)
+            [N/m].
+        displacement: Displacement u at the positions, see ``read_lines``, shape (3, >= p + PAD) [m]; finite in the
+            padding.
+        force: K u at the positions, shape (3, >= p + PAD) [N], added to.
     """
     faces, forces = np.zeros((3, 4, COLUMNS)), np.zeros((3, 4, COLUMNS))
     for r in range(len(rows)):

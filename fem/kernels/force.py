@@ -8,17 +8,18 @@ from reflowshock.fem.kernels.hexahedron import FINITE
 
 @njit(cache=True, fastmath=FINITE)
 def add_block_force(pointer, columns, blocks, displacement, force):
-    """Subtract K u, K symmetric in compressed rows of 3 x 3 blocks: upper blocks only, diagonal blocks halved.
+    """Subtract K u from the force, K a symmetric matrix in compressed rows of 3 x 3 blocks.
 
-    Half the blocks is half the memory traffic, which bounds this kernel. Each block serves row and column, which is
-    safe because a rank is one thread. Unsigned indices spare the test for negative ones at each access.
+    Only the upper blocks are stored, diagonal blocks halved. Half the blocks is half the memory traffic, which bounds
+    this kernel. Each block serves row and column, which is safe because a rank is one thread. Unsigned indices spare
+    the test for negative ones at each access.
 
     Args:
-        pointer: ``(n + 1,)`` int32, first block of each row.
-        columns: ``(nb,)`` int32.
-        blocks: ``(nb, 3, 3)`` [N/m].
-        displacement: ``(>= n, 3)`` [m].
-        force: ``(>= n, 3)`` [N], added to.
+        pointer: First block of each row, and the number of blocks, shape (n + 1,) int32.
+        columns: Column (node) of each block, shape (nb,) int32.
+        blocks: Blocks of K, shape (nb, 3, 3) [N/m].
+        displacement: Nodal displacement u, shape (>= n, 3) [m].
+        force: Nodal force, shape (>= n, 3) [N], subtracted from.
     """
     for row in range(len(pointer) - 1):
         if pointer[row] == pointer[row + 1]:  # most nodes, where few elements of a model are assembled
@@ -45,7 +46,17 @@ def add_block_force(pointer, columns, blocks, displacement, force):
 
 @njit(cache=True)
 def assemble_upper_blocks(cells, stiffness, pointer, columns, blocks):
-    """Add element stiffnesses ``(ne, 3k, 3k)`` into upper block rows with sorted columns; diagonal blocks halved."""
+    """Add element stiffnesses to the upper 3 x 3 blocks of a symmetric matrix in compressed rows.
+
+    Diagonal blocks are halved, as ``add_block_force`` expects.
+
+    Args:
+        cells: Nodes of each element, shape (ne, k).
+        stiffness: Element stiffnesses, node by node, shape (ne, 3k, 3k) [N/m].
+        pointer: First block of each row, and the number of blocks, shape (n + 1,).
+        columns: Column (node) of each block, ascending in a row, shape (nb,); must contain all pairs of ``cells``.
+        blocks: Blocks of the matrix, shape (nb, 3, 3) [N/m], added to.
+    """
     for e in range(len(cells)):
         for a in range(cells.shape[1]):
             row = cells[e, a]

@@ -57,7 +57,17 @@ class ElementState(NamedTuple):
 
 @njit(cache=True)
 def hencky(strain, law, stress, tangent):
-    """Write stress ``(6,)`` [Pa] and tangent ``(6, 6)`` [Pa] at a strain ``(6,)``; return the plastic strain."""
+    """Compute stress and tangent of deformation plasticity at one point.
+
+    Args:
+        strain: Strain xx, yy, zz, xy, yz, xz with engineering shear, shape (6,).
+        law: ``PointLaw``: elasticity (6, 6) [Pa] and plastic constants (6,).
+        stress: Written, shape (6,) [Pa].
+        tangent: Written, shape (6, 6) [Pa].
+
+    Returns:
+        Equivalent plastic strain, 0 where the material is elastic.
+    """
     copy_square(law.elasticity, tangent)
     stress[:] = 0.0
     for i in range(6):
@@ -107,7 +117,13 @@ def soften(deviator, across, along, tangent):
 
 @njit(cache=True)
 def add_points(shape, unknowns, law, state):
-    """Write the state of an element at unknowns ``(k,)`` [m].
+    """Compute stresses, internal force and tangent of one element from its displacements.
+
+    Args:
+        shape: ``Shape``: strain matrices (m, 6, k) [1/m] and weights (m,) [m^3] of the integration points.
+        unknowns: Displacements of 24 nodal components, then of incompatible modes if any, shape (k,) [m].
+        law: ``PointLaw`` of the element.
+        state: ``ElementState`` of the element, overwritten: points (m, 7), force (k,) [N], tangent (k, k) [N/m].
 
     Returns:
         Largest sum of magnitudes of the force contributions to an incompatible mode [N], the scale of its residual.
@@ -138,9 +154,19 @@ def add_points(shape, unknowns, law, state):
 
 @njit(cache=True)
 def relax_modes(shape, unknowns, law, state):
-    """Bring the incompatible modes into equilibrium by Newton's method; return whether it converged.
+    """Bring the nine incompatible modes of a hexahedron into equilibrium by Newton's method.
 
     The energy is convex, so a step beyond the minimum along its direction is shortened to where the slope changes sign.
+
+    Args:
+        shape: ``Shape`` of the element: strain matrices (8, 6, 33) [1/m], weights (8,) [m^3].
+        unknowns: Nodal displacements (24 entries, fixed), then the modes (9 entries, start values replaced by the
+            solution), shape (33,) [m].
+        law: ``PointLaw`` of the element.
+        state: ``ElementState`` of the element, overwritten: points (8, 7), force (33,) [N], tangent (33, 33) [N/m].
+
+    Returns:
+        Whether the iteration converged.
     """
     scale, step, start = add_points(shape, unknowns, law, state), np.empty(ALL - NODAL), np.empty(ALL - NODAL)
     rest, modes = state.force[NODAL:], unknowns[NODAL:]
@@ -164,7 +190,7 @@ def relax_modes(shape, unknowns, law, state):
 
 @njit(cache=True)
 def largest_of(values):
-    """Return the largest magnitude of values, 0 for an empty array, and NaN if a value is NaN."""
+    """Return the largest magnitude in an array of shape (k,), 0 if it is empty, and NaN if a value is NaN."""
     largest = 0.0
     for value in values:
         if abs(value) > largest or np.isnan(value):
@@ -174,7 +200,7 @@ def largest_of(values):
 
 @njit(cache=True)
 def product(left, right):
-    """Return the product of two vectors."""
+    """Return the scalar product of two vectors of shape (k,)."""
     total = 0.0
     for k in range(len(left)):
         total += left[k] * right[k]
@@ -183,7 +209,12 @@ def product(left, right):
 
 @njit(cache=True)
 def solve(matrix, right):
-    """Solve a symmetric positive definite system in place (Gauss)."""
+    """Solve a symmetric positive definite linear system in place by Gaussian elimination.
+
+    Args:
+        matrix: Shape (k, k), overwritten by its upper triangular factor.
+        right: Right-hand side on entry, solution on return, shape (k,).
+    """
     size = len(right)
     for pivot in range(size):
         for i in range(pivot + 1, size):
@@ -199,16 +230,17 @@ def solve(matrix, right):
 
 @njit(cache=True)
 def hexahedra(corners, displacement, materials, states):
-    """Write the states of fully integrated hexahedra with incompatible modes at a displacement.
+    """Compute stresses, forces and tangents of fully integrated hexahedra with incompatible modes from displacements.
 
     Args:
-        corners: ``(ne, 8, 3)`` [m].
-        displacement: ``(ne, 24)`` [m] at the nodes, less free expansion.
-        materials: Elasticities ``(nm, 6, 6)`` [Pa], plastic constants ``(nm, 6)``, index of each element ``(ne,)``.
-        states: ``ElementState`` of arrays ``(ne, 8, 7)``, ``(ne, 24)``, ``(ne, 24, 24)``, written.
+        corners: Node positions in tensor order, shape (ne, 8, 3) [m].
+        displacement: Displacement node by node, less free expansion, shape (ne, 24) [m].
+        materials: Elasticities (nm, 6, 6) [Pa], plastic constants (nm, 6), index of each element's material (ne,).
+        states: ``ElementState``, written: stress [Pa] and plastic strain at the Gauss points (ne, 8, 7), internal force
+            (ne, 24) [N], tangent (ne, 24, 24) [N/m] with the modes condensed.
 
     Returns:
-        The first element whose modes found no equilibrium, or the number of elements.
+        Index of the first element whose modes do not converge; then the rest is not computed. Otherwise ``ne``.
     """
     elasticity, plastic, material = materials
     bench, shape, unknowns = new_strain_bench(), Shape(np.empty((8, 6, ALL)), np.empty(8)), np.empty(ALL)
@@ -229,13 +261,14 @@ def hexahedra(corners, displacement, materials, states):
 
 @njit(cache=True)
 def one_point(shape, displacement, materials, states):
-    """Write the states of one-point hexahedra without their hourglass forces.
+    """Compute stresses, forces and tangents of one-point hexahedra from displacements, without hourglass forces.
 
     Args:
-        shape: ``Shape`` of arrays ``(ne, 1, 6, 24)``, ``(ne, 1)``: the mean strains.
-        displacement: ``(ne, 24)`` [m] at the nodes, less free expansion.
-        materials: As of ``hexahedra``.
-        states: ``ElementState`` of arrays ``(ne, 1, 7)``, ``(ne, 24)``, ``(ne, 24, 24)``, written.
+        shape: ``Shape`` of all elements: mean strain matrices (ne, 1, 6, 24) [1/m], volumes (ne, 1) [m^3].
+        displacement: Displacement node by node, less free expansion, shape (ne, 24) [m].
+        materials: Elasticities (nm, 6, 6) [Pa], plastic constants (nm, 6), index of each element's material (ne,).
+        states: ``ElementState``, written: stress [Pa] and plastic strain (ne, 1, 7), internal force (ne, 24) [N],
+            tangent (ne, 24, 24) [N/m].
     """
     elasticity, plastic, material = materials
     for e in range(len(displacement)):
@@ -246,13 +279,13 @@ def one_point(shape, displacement, materials, states):
 
 @njit(cache=True, error_model="numpy")
 def hourglass_share(points, stress, laws, share):
-    """Write the share ``(ne,)`` of the elastic hourglass forces that sections carry, see ``nonlinear_one_point``.
+    """Compute the fraction of elastic hourglass forces that yielding sections carry, see ``nonlinear_one_point``.
 
     Args:
-        points: ``(ne, 1, 7)`` stress [Pa] and plastic strain of the centres.
-        stress: ``(ne,)`` [Pa] elastic hourglass stress.
-        laws: ``(ne, 6)``, see ``materials.plasticity.plastic_constants``.
-        share: Result.
+        points: Stress [Pa] and plastic strain at the centres, shape (ne, 1, 7).
+        stress: Elastic hourglass stress, shape (ne,) [Pa].
+        laws: Plastic constants of each element, shape (ne, 6), see ``materials.plasticity.plastic_constants``.
+        share: Written: fraction between 0 and 1, shape (ne,).
     """
     for e in range(len(stress)):
         s = points[e, 0]

@@ -15,7 +15,11 @@ FINITE = {"reassoc", "contract", "arcp", "nsz"}
 
 
 def shape_derivatives(xi: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return dN_a/dxi_d at the points ``xi (m, 3)`` of the reference cube [-1, 1]^3: ``(m, 8, 3)``."""
+    """Return dN_a/dxi_d of the eight trilinear shape functions, shape (m, 8, 3).
+
+    Args:
+        xi: Points in the reference cube [-1, 1]^3, shape (m, 3).
+    """
     factors = 1.0 + xi[:, None, :] * SIDES
     derivatives = np.empty((len(xi), 8, 3))
     for d in range(3):
@@ -31,7 +35,7 @@ GAUSS_VALUES = 0.125 * np.prod(1.0 + GAUSS[:, None, :] * SIDES, axis=2)
 
 @njit(cache=True, fastmath=FINITE)
 def add_product(left, right, scale, result):
-    """Add scale * left @ right to a matrix."""
+    """Add ``scale * left @ right`` to ``result``: matrices (m, k), (k, n) and (m, n), scale a scalar."""
     for i in range(left.shape[0]):
         for k in range(left.shape[1]):
             factor = scale * left[i, k]
@@ -41,7 +45,17 @@ def add_product(left, right, scale, result):
 
 @njit(cache=True)
 def invert_jacobian(points, derivatives, jacobian, inverse):
-    """Write J_ij = dx_i/dxi_j and its inverse, return its determinant."""
+    """Compute the Jacobian J_ij = dx_i/dxi_j of a hexahedron at one point, and its inverse.
+
+    Args:
+        points: Node positions, shape (8, 3) [m].
+        derivatives: Derivatives of the shape functions at the point, shape (8, 3).
+        jacobian: Written, shape (3, 3) [m].
+        inverse: Written: dxi_j/dx_i at row j, column i, shape (3, 3) [1/m].
+
+    Returns:
+        Determinant of J [m^3]; not positive if the element is inverted there.
+    """
     jacobian[:] = 0.0
     add_product(points.T, derivatives, 1.0, jacobian)
     for i in range(3):
@@ -56,7 +70,15 @@ def invert_jacobian(points, derivatives, jacobian, inverse):
 
 @njit(cache=True)
 def write_strain_columns(strain, column, gx, gy, gz):
-    """Write the three columns of the strain matrix ``(6, .)`` of a function with gradient (gx, gy, gz)."""
+    """Write three columns of a strain matrix, for the three displacement components of one function.
+
+    Args:
+        strain: Strain matrix, rows xx, yy, zz, xy, yz, xz (engineering shear), shape (6, k) [1/m].
+        column: First of the columns, for the component along x.
+        gx: Derivative of the function along x, scalar [1/m].
+        gy: Derivative along y.
+        gz: Derivative along z.
+    """
     strain[:, column : column + 3] = 0.0
     strain[0, column] = gx
     strain[1, column + 1] = gy
@@ -71,7 +93,10 @@ def write_strain_columns(strain, column, gx, gy, gz):
 
 @njit(cache=True)
 def condense(full, kept):
-    """Condense a symmetric matrix to its first ``kept`` rows and columns in place (Gaussian elimination)."""
+    """Condense a symmetric matrix of shape (n, n) to its first ``kept`` unknowns in place (Gaussian elimination).
+
+    The upper left block of shape (kept, kept) is the result; the other entries are left undefined.
+    """
     for pivot in range(full.shape[0] - 1, kept - 1, -1):
         for i in range(pivot):
             factor = full[i, pivot] / full[pivot, pivot]
@@ -81,7 +106,12 @@ def condense(full, kept):
 
 @njit(cache=True)
 def orthonormal_linear(weights, basis):
-    """Write 1, xi, eta, zeta at the Gauss points, orthonormal under ``weights (8,)``: ``basis (4, 8)``."""
+    """Orthonormalise the functions 1, xi, eta, zeta at the eight Gauss points by Gram-Schmidt.
+
+    Args:
+        weights: Weights of the Gauss points in the scalar product, shape (8,).
+        basis: Written: values of the four functions at the Gauss points, shape (4, 8).
+    """
     for k in range(4):
         for g in range(8):
             basis[k, g] = 1.0 if k == 0 else GAUSS[g, k - 1]
@@ -100,7 +130,14 @@ def orthonormal_linear(weights, basis):
 
 @njit(cache=True)
 def linear_divergence(weights, gradient, basis, result):
-    """Write the least-squares linear part of each shape function's gradient: ``(8, 8, 3)`` per Gauss point and node."""
+    """Compute the least-squares linear part of the shape-function gradients of a hexahedron (B-bar dilatation).
+
+    Args:
+        weights: Weights of the Gauss points, shape (8,) [m^3].
+        gradient: Gradient of each shape function, Gauss point by node by direction, shape (8, 8, 3) [1/m].
+        basis: Workspace of shape (4, 8), overwritten by ``orthonormal_linear``.
+        result: Written: linear part of the gradients, shape (8, 8, 3) [1/m].
+    """
     orthonormal_linear(weights, basis)
     result[:] = 0.0
     for a in range(8):
@@ -126,7 +163,7 @@ class StrainBench(NamedTuple):
 
 @njit(cache=True)
 def new_strain_bench():
-    """Return the work space of ``write_strains``, uninitialised."""
+    """Return a ``StrainBench``, the workspace of ``write_strains`` for one element; its arrays are uninitialised."""
     square, nodal = (3, 3), (8, 8, 3)
     return StrainBench(
         np.empty(square), np.empty(square), np.empty(square), np.empty(nodal), np.empty(nodal), np.empty((4, 8))
@@ -135,7 +172,7 @@ def new_strain_bench():
 
 @njit(cache=True)
 def write_strains(points, bench, strain, weights):
-    """Write the strain matrices of a hexahedron with Taylor-modified Wilson modes at 2 x 2 x 2 Gauss points.
+    """Compute the strain matrices of a hexahedron with Taylor-modified Wilson modes at 2 x 2 x 2 Gauss points.
 
     The gradients of the modes 1 - xi_k^2 use the Jacobian at the centre, scaled by det J_0 / det J, so that the patch
     test holds on distorted shapes (Taylor, Beresford & Wilson, IJNME 10, 1976). No mode balances the bilinear part of
@@ -143,10 +180,11 @@ def write_strains(points, bench, strain, weights):
     least squares with the weights det J keeps the patch test).
 
     Args:
-        points: ``(8, 3)`` [m].
-        bench: Arrays to work with.
-        strain: ``(8, 6, 33)`` [1/m] of 24 components at the nodes and three at each mode.
-        weights: ``(8,)`` [m^3].
+        points: Node positions in tensor order, shape (8, 3) [m].
+        bench: Workspace of ``new_strain_bench``, overwritten.
+        strain: Written: matrix of each Gauss point, rows xx, yy, zz, xy, yz, xz; columns are 24 nodal components (node
+            by node), then three components of each of the three modes, shape (8, 6, 33) [1/m].
+        weights: Written: volume of each Gauss point, det J, shape (8,) [m^3].
     """
     inverse, centre, gradient, divergence = bench.inverse, bench.centre, bench.gradient, bench.divergence
     gradient[:] = 0.0
@@ -170,13 +208,13 @@ def write_strains(points, bench, strain, weights):
 
 @njit(cache=True)
 def stiffness(points, elasticity, material, result):
-    """Write the stiffness of hexahedra with incompatible modes; the nine internal unknowns are condensed.
+    """Compute the stiffness of hexahedra with incompatible modes; the nine internal unknowns are condensed.
 
     Args:
-        points: ``(ne, 8, 3)`` [m].
-        elasticity: ``(nm, 6, 6)`` [Pa].
-        material: ``(ne,)`` index into ``elasticity``.
-        result: ``(ne, 24, 24)`` [N/m].
+        points: Node positions in tensor order, shape (ne, 8, 3) [m].
+        elasticity: Elasticity of each material, shape (nm, 6, 6) [Pa].
+        material: Index of each element into ``elasticity``, shape (ne,).
+        result: Written, node by node, shape (ne, 24, 24) [N/m].
     """
     bench, strain, weights = new_strain_bench(), np.empty((8, 6, 33)), np.empty(8)
     stress, full = np.empty((6, 33)), np.empty((33, 33))
@@ -193,7 +231,10 @@ def stiffness(points, elasticity, material, result):
 
 @njit(cache=True)
 def copy_square(source, result):
-    """Copy the upper left part of a matrix; assigned as a slice it would take Numba seconds to compile its message."""
+    """Copy the upper left part of ``source`` into ``result (n, n)``.
+
+    As a slice assignment, Numba would need seconds to compile the message of the error for wrong shapes.
+    """
     for i in range(result.shape[0]):
         for j in range(result.shape[1]):
             result[i, j] = source[i, j]
@@ -201,13 +242,16 @@ def copy_square(source, result):
 
 @njit(cache=True)
 def geometry(points, nodal_volume, gradient):
-    """Write the nodal volumes and mean gradients of hexahedra; return the lowest Jacobian determinant per element.
+    """Compute nodal volumes and mean gradients of hexahedra.
 
     Args:
-        points: ``(ne, 8, 3)`` [m].
-        nodal_volume: ``(ne, 8)`` [m^3], the integral of each shape function.
-        gradient: ``(ne, 8, 3)`` [1/m], the volume average of each shape function's gradient; incompatible modes add
-            nothing to the average strain, so this recovers the element's average strain exactly.
+        points: Node positions in tensor order, shape (ne, 8, 3) [m].
+        nodal_volume: Written: integral of each shape function, shape (ne, 8) [m^3].
+        gradient: Written: volume average of each shape function's gradient, shape (ne, 8, 3) [1/m]; incompatible modes
+            add nothing to the average strain, so this recovers the element's average strain exactly.
+
+    Returns:
+        Lowest Jacobian determinant at the Gauss points of each element, shape (ne,) [m^3]; not positive if inverted.
     """
     jacobian, inverse = np.empty((3, 3)), np.empty((3, 3))
     lowest = np.full(len(points), np.inf)

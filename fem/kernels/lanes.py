@@ -16,7 +16,12 @@ LANE_OPTIONS = {"cache": True, "fastmath": FINITE, "error_model": "numpy"}
 
 @njit(**LANE_OPTIONS)
 def nine(values, at):
-    """Return nine entries of a lane, from ``at`` on."""
+    """Return the 3 x 3 matrix of one element as nine scalars, row by row.
+
+    Args:
+        values: Flat array of sixteen elements; entry k of the matrix is ``values[at + 16 * k]``.
+        at: Position of its first entry, a multiple of 16 plus the number of the element (0 to 15).
+    """
     return (
         values[at],
         values[at + LANES],
@@ -32,7 +37,7 @@ def nine(values, at):
 
 @njit(**LANE_OPTIONS)
 def put_nine(values, at, m):
-    """Write nine entries of a lane, from ``at`` on."""
+    """Write the 3 x 3 matrix ``m`` of one element, nine scalars row by row, to ``values[at + 16 * k]``."""
     values[at], values[at + LANES], values[at + 2 * LANES] = m[0], m[1], m[2]
     values[at + 3 * LANES], values[at + 4 * LANES], values[at + 5 * LANES] = m[3], m[4], m[5]
     values[at + 6 * LANES], values[at + 7 * LANES], values[at + 8 * LANES] = m[6], m[7], m[8]
@@ -40,7 +45,12 @@ def put_nine(values, at, m):
 
 @njit(**LANE_OPTIONS)
 def six(values, at):
-    """Return six entries of a lane, from ``at`` on: a symmetric matrix as xx, yy, zz, xy, yz, xz."""
+    """Return the symmetric 3 x 3 matrix of one element as six scalars: xx, yy, zz, xy, yz, xz.
+
+    Args:
+        values: Flat array of sixteen elements; entry k of the matrix is ``values[at + 16 * k]``.
+        at: Position of its first entry, a multiple of 16 plus the number of the element (0 to 15).
+    """
     return (
         values[at],
         values[at + LANES],
@@ -53,14 +63,14 @@ def six(values, at):
 
 @njit(**LANE_OPTIONS)
 def put_six(values, at, m):
-    """Write six entries of a lane, from ``at`` on."""
+    """Write the symmetric matrix ``m``, six scalars, of one element to ``values[at + 16 * k]``; as ``six`` reads."""
     values[at], values[at + LANES], values[at + 2 * LANES] = m[0], m[1], m[2]
     values[at + 3 * LANES], values[at + 4 * LANES], values[at + 5 * LANES] = m[3], m[4], m[5]
 
 
 @njit(**LANE_OPTIONS)
 def six_of(values, g, at):
-    """Return six entries of a lane, from ``at`` on, in a row of values."""
+    """Return six scalars of one element, ``values[g, at + 16 * k]`` for k = 0 to 5; row ``g`` of a 2D array."""
     return (
         values[g, at],
         values[g, at + LANES],
@@ -73,32 +83,32 @@ def six_of(values, g, at):
 
 @njit(**LANE_OPTIONS)
 def put_six_of(values, g, at, m):
-    """Write six entries of a lane, from ``at`` on, in a row of values."""
+    """Write six scalars ``m`` of one element to ``values[g, at + 16 * k]``; ``put_six`` for row ``g`` of a 2D array."""
     values[g, at], values[g, at + LANES], values[g, at + 2 * LANES] = m[0], m[1], m[2]
     values[g, at + 3 * LANES], values[g, at + 4 * LANES], values[g, at + 5 * LANES] = m[3], m[4], m[5]
 
 
 @njit(**LANE_OPTIONS)
 def three(values, at):
-    """Return three entries of a lane, from ``at`` on."""
+    """Return three scalars of one element, ``values[at + 16 * k]`` for k = 0 to 2; ``at`` as in ``nine``."""
     return values[at], values[at + LANES], values[at + 2 * LANES]
 
 
 @njit(**LANE_OPTIONS)
 def put_three(values, at, v):
-    """Write three entries of a lane, from ``at`` on."""
+    """Write the vector ``v``, three scalars, of one element to ``values[at + 16 * k]``; as ``three`` reads."""
     values[at], values[at + LANES], values[at + 2 * LANES] = v[0], v[1], v[2]
 
 
 @njit(**LANE_OPTIONS)
 def cross(a, b):
-    """Return the cross product of two vectors."""
+    """Return the cross product a x b of two vectors as three scalars."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @njit(**LANE_OPTIONS)
 def applied(m, v):
-    """Return a matrix times a vector of three entries."""
+    """Return m v as three scalars; m is a 3 x 3 matrix (nine scalars, row by row), v a vector (three scalars)."""
     return (
         m[0] * v[0] + m[1] * v[1] + m[2] * v[2],
         m[3] * v[0] + m[4] * v[1] + m[5] * v[2],
@@ -108,13 +118,13 @@ def applied(m, v):
 
 @njit(**LANE_OPTIONS)
 def full(m):
-    """Return a symmetric matrix as nine entries."""
+    """Return a symmetric matrix, given as xx, yy, zz, xy, yz, xz, as nine scalars row by row."""
     return m[0], m[3], m[5], m[3], m[1], m[4], m[5], m[4], m[2]
 
 
 @njit(**LANE_OPTIONS)
 def times(m, n):
-    """Return the product of two matrices."""
+    """Return the matrix product m n of two 3 x 3 matrices, each nine scalars row by row."""
     return (
         m[0] * n[0] + m[1] * n[3] + m[2] * n[6],
         m[0] * n[1] + m[1] * n[4] + m[2] * n[7],
@@ -130,13 +140,13 @@ def times(m, n):
 
 @njit(**LANE_OPTIONS)
 def transposed(m):
-    """Return the transpose."""
+    """Return the transpose of a 3 x 3 matrix of nine scalars, row by row."""
     return m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8]
 
 
 @njit(**LANE_OPTIONS)
 def scaled(factor, m):
-    """Return a factor times a matrix."""
+    """Return a scalar factor times a 3 x 3 matrix of nine scalars."""
     return (
         factor * m[0],
         factor * m[1],
@@ -152,7 +162,7 @@ def scaled(factor, m):
 
 @njit(**LANE_OPTIONS)
 def cofactor(m):
-    """Return the matrix of cofactors, det(m) m^-T."""
+    """Return the cofactor matrix det(m) m^-T of a 3 x 3 matrix; both are nine scalars, row by row."""
     return (
         m[4] * m[8] - m[5] * m[7],
         m[5] * m[6] - m[3] * m[8],
@@ -168,7 +178,7 @@ def cofactor(m):
 
 @njit(**LANE_OPTIONS)
 def cofactor_symmetric(m):
-    """Return the cofactors of a symmetric matrix of six entries, as six."""
+    """Return the cofactor matrix of a symmetric matrix; both are six scalars: xx, yy, zz, xy, yz, xz."""
     return (
         m[1] * m[2] - m[4] * m[4],
         m[0] * m[2] - m[5] * m[5],
@@ -181,13 +191,19 @@ def cofactor_symmetric(m):
 
 @njit(**LANE_OPTIONS)
 def determinant(m, cofactors):
-    """Return the determinant of nine entries with their cofactors."""
+    """Return the determinant of a 3 x 3 matrix, given its nine entries and its cofactors from ``cofactor``."""
     return m[0] * cofactors[0] + m[1] * cofactors[1] + m[2] * cofactors[2]
 
 
 @njit(cache=True)
 def gather_lanes(cells, values, result):
-    """Copy the rows ``values (n, 3)`` at the nodes ``cells (k, 16)`` of a block into lanes ``(48 k,)``."""
+    """Copy nodal vectors of sixteen elements with k nodes into a flat array.
+
+    Args:
+        cells: Nodes of the elements, shape (k, 16).
+        values: Nodal vectors, such as displacements [m], shape (n, 3).
+        result: Written: component c at node a of element e at ``16 * (3 a + c) + e``, shape (>= 48 k,).
+    """
     for a in range(len(cells)):
         for lane in range(LANES):
             row = values[cells[a, lane]]
@@ -197,7 +213,14 @@ def gather_lanes(cells, values, result):
 
 @njit(cache=True)
 def scatter_lanes(cells, count, source, values):
-    """Subtract the lanes ``source (48 k,)`` from the rows ``values (n, 3)``; only the first ``count`` lanes."""
+    """Subtract nodal vectors of elements from the rows of an array over all nodes.
+
+    Args:
+        cells: Nodes of the sixteen elements, shape (k, 16).
+        count: Number of leading elements that count; the others repeat the last of them.
+        source: Vectors of the elements, such as forces [N], in the order of ``gather_lanes``, shape (>= 48 k,).
+        values: Nodal vectors, shape (n, 3), subtracted from.
+    """
     for a in range(len(cells)):
         for lane in range(count):
             row = values[cells[a, lane]]
@@ -209,7 +232,12 @@ def scatter_lanes(cells, count, source, values):
 
 @njit(**LANE_OPTIONS)
 def turn(rotation, vectors):
-    """Turn vectors ``(16 * 3 m,)`` by a rotation ``(16 * 9,)``, in place."""
+    """Rotate vectors of sixteen elements in place: v becomes R v.
+
+    Args:
+        rotation: One matrix R per element, entry k of element e at ``16 * k + e``, row by row, shape (144,).
+        vectors: m vectors per element, component c of vector i at ``16 * (3 i + c) + e``, shape (48 m,).
+    """
     for start in range(0, len(vectors), 3 * LANES):
         v = vectors[start : start + 3 * LANES]
         for lane in range(LANES):
@@ -218,7 +246,7 @@ def turn(rotation, vectors):
 
 @njit(**LANE_OPTIONS)
 def turn_back(rotation, vectors):
-    """Turn vectors by the transpose of a rotation, in place."""
+    """Rotate vectors of sixteen elements in place by the transpose: v becomes R^T v; arguments as in ``turn``."""
     for start in range(0, len(vectors), 3 * LANES):
         v = vectors[start : start + 3 * LANES]
         for lane in range(LANES):
@@ -227,7 +255,13 @@ def turn_back(rotation, vectors):
 
 @njit(**LANE_OPTIONS)
 def add_elastic(s, d, c):
-    """Return s + C d, six entries, d with engineering shear; c as in ``kernels.nonlinear.elastic_stress``."""
+    """Return the stress s + C d of one point as six scalars: xx, yy, zz, xy, yz, xz.
+
+    Args:
+        s: Stress, six scalars [Pa].
+        d: Strain increment, six scalars, with engineering shear.
+        c: Orthotropic elasticity, nine scalars [Pa] in the order of ``kernels.nonlinear.elastic_stress``.
+    """
     return (
         s[0] + c[0] * d[0] + c[3] * d[1] + c[5] * d[2],
         s[1] + c[3] * d[0] + c[1] * d[1] + c[4] * d[2],

@@ -93,7 +93,7 @@ def forces_of(arrays):
 
 @njit(cache=True)
 def paced_forces_of(arrays, every):
-    """Return the ``PacedForces`` with these attributes."""
+    """Return ``PacedForces``; ``arrays``: ``PACES`` ``Forces``; ``every``: interval of each pace in steps, (PACES,)."""
     return PacedForces(arrays, every)
 
 
@@ -148,10 +148,11 @@ class Interface(NamedTuple):
 
 @njit(inline="always")  # compiled once, inside ``take_steps``
 def add_forces(arrays, displacement, force):
-    """Subtract the internal force of all terms, as their ``add`` does.
+    """Subtract the internal force of the terms in ``Forces`` at displacements ``(n, 3)`` [m] from ``force (n, 3)`` [N].
 
     Returns:
-        ``ALL_FINE``, or the index into ``NAMES`` of a term with an inverted element; and the element's block or row.
+        ``ALL_FINE`` (-1), or the index into ``NAMES`` of a term with an inverted element; and the element's block or
+        row.
     """
     nodes, axes, rows, blocks, lines = arrays.congruent
     if len(rows):
@@ -187,20 +188,20 @@ def add_forces(arrays, displacement, force):
 
 @njit(cache=True)
 def take_steps(motion, forces, interface, accelerations, step):
-    """Take steps of central differences as ``ExplicitMotion.advance`` and ``update_force`` do.
+    """Take m steps of central differences as ``ExplicitMotion.advance`` and ``update_force`` do; ``motion`` is updated.
 
-    Nodes without forces for some steps take these steps at once. The work of the steady part of the body force follows
-    from the displacement of all masses, the work of its change is summed step by step.
+    The work of the steady part of the body force follows from the displacement of all masses, that of its change is
+    summed.
 
     Args:
         motion: ``StepArrays``.
         forces: ``PacedForces``; all of them have just acted, and act again after the last step.
-        interface: ``Interface``.
-        accelerations: ``(m + 1, 3)`` [m/s^2] of all masses as each step begins, and after the last.
-        step: dt [s].
+        interface: ``Interface``, impulses added to.
+        accelerations: ``(m + 1, 3)`` [m/s^2] of the body force as each step begins, and after the last.
+        step: Time step dt [s].
 
     Returns:
-        Work of the accelerations [J]; steps taken; what ``add_forces`` returned last; at which pace that was.
+        Work of the accelerations [J]; steps taken; both results of the last ``add_forces``; pace of these forces.
     """
     displacement, velocity, force = motion.state[0], motion.state[1], motion.state[2]
     last, pushed, every = len(accelerations) - 1, np.zeros_like(motion.ahead), forces.every
@@ -240,25 +241,25 @@ def take_steps(motion, forces, interface, accelerations, step):
 
 @njit(cache=True)
 def count_impulses(interface, substep, force):
-    """Add the weighted force ``(k, 3)`` [N] of the leading nodes after a step to the impulses of an ``Interface``."""
+    """Add the force ``(n, 3)`` [N] of the leading nodes after step ``substep`` to the impulses of an ``Interface``."""
     for j in range(2):
         add_impulse(interface.counted, force, interface.weights[substep, j], interface.impulses[j])
 
 
 @njit(cache=True)
 def acts(forces, pace, substep):
-    """Return whether terms of a pace act after a step."""
+    """Return whether the terms of a pace (index into ``PacedForces``) act after step number ``substep`` (from 1)."""
     return forces.every[pace] > 0 and substep % forces.every[pace] == 0
 
 
 @njit(cache=True)
 def move_nodes(motion, block, body, step):
-    """Move some nodes by the steps since something acted on them, and zero their force.
+    """Move a range of nodes by the steps since a force acted on them, and zero their force.
 
     Args:
-        motion: As in ``take_steps``.
-        block: First node, end, steps to be taken and the number of the last of them.
-        body: Body accelerations at the start of each step, and the deviation of their means from the steady part.
+        motion: ``StepArrays``, updated.
+        block: First node, end, number of steps to take and number of the last of them (from 1).
+        body: Accelerations (m + 1, 3) as steps begin, mean deviations from the steady part (m, 3) [m/s^2].
         step: Time step dt [s].
 
     Returns:
@@ -276,7 +277,7 @@ def move_nodes(motion, block, body, step):
 
 @njit(cache=True)
 def move_interface(interface, block, velocity):
-    """Prescribe the mean velocities of an ``Interface`` over some steps; ``block`` as in ``move_nodes``."""
+    """Set ``velocity (n, 3)`` [m/s] to the mean of an ``Interface`` over some steps; ``block`` as in ``move_nodes``."""
     begin, end, count, substep = block
     x = y = z = 0.0
     for k in range(substep - count, substep):
@@ -292,9 +293,9 @@ def move_interface(interface, block, velocity):
 
 @njit(inline="always")
 def add_paced_forces(motion, forces, substep, pushed, final):
-    """Add the forces that act after a step, each for its whole interval; return the latest ``add_forces`` and its pace.
+    """Add the forces that act after step ``substep``, each for its interval; return as ``add_forces``, then the pace.
 
-    The final step adds the share of later steps to ``ahead``; ``pushed (n, 3)`` is zero between calls.
+    The ``final`` step (bool) adds the share of later steps to ``ahead``; workspace ``pushed (n, 3)`` stays zero.
     """
     force = motion.state[2]
     for pace in range(PACES):
@@ -310,7 +311,7 @@ def add_paced_forces(motion, forces, substep, pushed, final):
 
 @njit(cache=True)
 def gather_forces(motion, moved, final):
-    """Move the forces of the leading slaves to their masters; in the final step also store them and move ``ahead``."""
+    """Move the forces of the first ``moved`` slaves to their masters; if ``final``, store them and move ``ahead``."""
     slave, master, weight = motion.slave[:moved], motion.master[:moved], motion.weight[:moved]
     force = motion.state[2]
     for i in range(moved if final else 0):
@@ -323,7 +324,7 @@ def gather_forces(motion, moved, final):
 
 @njit(cache=True)
 def begin_substeps(rows, values, state):
-    """Copy the displacements of a level from rows of ``values``; force and sum are zero between calls."""
+    """Copy rows ``rows (n,)`` of displacements ``values (>= n, 3)`` [m] into ``state (3, n, 3)`` of a level."""
     place = state[0]
     for i in range(len(rows)):
         row = rows[i]
@@ -335,10 +336,10 @@ def take_substep(coefficients, inverse, change, state):
     """Add the weighted force to the sum and zero it; move the free nodes, the first ones.
 
     Args:
-        coefficients: memory, rate, weight, see ``levels.chebyshev.Substeps``.
-        inverse: ``(nf, 3)`` DT^2 / m [s^2/kg], zero where a component is held.
+        coefficients: Three scalars: memory, rate, weight, see ``fem.division.chebyshev.Substeps``.
+        inverse: ``(nf, 3)`` DT^2 / m [s^2/kg] of free nodes, zero for fixed components.
         change: ``(nf, 3)`` [m], of the displacement in the substep before, then in this one.
-        state: See above.
+        state: ``(3, n, 3)`` displacement [m], force [N], weighted sum of forces [N] of the level.
     """
     memory, rate, weight = coefficients
     factor, step = inverse.reshape(-1), change.reshape(-1)
@@ -360,10 +361,10 @@ def end_substeps(rows, foreign, state, values):
     """Add the sum of a level's forces to rows of ``values``, and zero it.
 
     Args:
-        rows: ``(n,)`` of ``values``.
-        foreign: Free nodes whose sum another rank adds.
-        state: See above.
-        values: ``(>= n, 3)`` [N].
+        rows: Rows of the level's nodes in ``values``, shape (n,).
+        foreign: Free nodes whose sum another rank adds, shape (k,).
+        state: State of the level, shape (3, n, 3), see ``take_substep``.
+        values: Forces of the surrounding level, shape (>= n, 3) [N], added to.
     """
     total = state[2]
     for i in range(len(foreign)):
@@ -384,8 +385,7 @@ def run_levels(levels, first, values, force):
     For levels with one assembled matrix and no node of another rank; same operations and order as the kernels above.
 
     Args:
-        levels: Rows, foreign, coefficients ``(p, 3)``, inverse, change and state of each level, outermost first, as
-            above; then pointer, columns and blocks of ``kernels.force.add_block_force``.
+        levels: Rows to state of each level as above, outermost first; then arrays of ``add_block_force``.
         first: Index of the level.
         values: Displacement of the surrounding level, shape (>= n, 3) [m].
         force: Force of the surrounding level, shape (>= n, 3) [N], added to.

@@ -10,13 +10,14 @@ STRIP = 192  # degrees of freedom: whole nodes and whole vectors
 
 @njit(cache=True)
 def advance(state, mobility, acceleration, step):
-    """Take one step of central differences: v += dt (f / m + g), u += dt v, at free degrees of freedom.
+    """Take one step of central differences in place: v += dt (f / m + g), u += dt v, at free degrees of freedom.
 
     Args:
-        state: ``(3, n, 3)``: displacement [m], velocity half a step back [m/s], force [N].
-        mobility: ``(n, 3)`` inverse mass [1/kg], zero where the velocity is prescribed.
-        acceleration: ``(3,)`` [m/s^2], of the body force.
-        step: dt [s].
+        state: Displacement u [m], velocity v half a step back [m/s] and nodal force f [N], shape (3, n, 3); u and v are
+            updated.
+        mobility: Inverse mass 1 / m, zero where the velocity is prescribed, shape (n, 3) [1/kg].
+        acceleration: Acceleration g of the body force, shape (3,) [m/s^2].
+        step: Time step dt [s].
     """
     kicks = np.zeros((3, 3))
     for c in range(3):
@@ -33,11 +34,12 @@ def move(state, mobility, nodes, kicks, steps):
     differently from its vectors, and copies of a node on several ranks would drift apart.
 
     Args:
-        state: As in ``advance``.
-        mobility: As in ``advance``.
+        state: Displacement [m], velocity half a step back [m/s] and force [N], shape (3, n, 3); the first two are
+            updated.
+        mobility: Inverse mass, zero where the velocity is prescribed, shape (n, 3) [1/kg].
         nodes: First node and end of the range.
         kicks: Contributions of the body force: velocity in the first step, velocity in the others [m/s], and
-            displacement by the latter [m], shape (3, 3).
+            displacement by the latter [m], shape (3, 3), see ``kicks_of``.
         steps: Time step dt [s] and number of steps.
     """
     step, span = steps[0], steps[0] * steps[1]
@@ -59,7 +61,14 @@ def move(state, mobility, nodes, kicks, steps):
 
 @njit(cache=True)
 def kicks_of(accelerations, step, kicks):
-    """Write the ``kicks (3, 3)`` of ``move`` from the body accelerations ``(k, 3)`` [m/s^2] as each step begins."""
+    """Compute the contributions of a body force to several steps at once, for ``move``.
+
+    Args:
+        accelerations: Body acceleration as each step begins, shape (k, 3) [m/s^2].
+        step: Time step dt [s].
+        kicks: Written: velocity in the first step, velocity in the others [m/s], and displacement by the latter [m];
+            shape (3, 3).
+    """
     for c in range(3):
         gained = drift = 0.0
         for k in range(1, len(accelerations)):
@@ -70,7 +79,12 @@ def kicks_of(accelerations, step, kicks):
 
 @njit(cache=True, fastmath=FINITE)
 def first_moment(mass, places):
-    """Return the sum of masses ``(n,)`` [kg] times positions [m] or velocities [m/s] ``(n, 3)``: three numbers."""
+    """Return the sum of masses times vectors as three scalars: first moment [kg m] or momentum [kg m/s].
+
+    Args:
+        mass: Nodal masses, shape (n,) [kg].
+        places: Positions [m] or velocities [m/s], shape (n, 3).
+    """
     x = y = z = 0.0
     for i in range(len(mass)):
         x += mass[i] * places[i, 0]
@@ -81,13 +95,14 @@ def first_moment(mass, places):
 
 @njit(cache=True)
 def work_of_changes(nodes, changes, accelerations, step):
-    """Return the work [J] of a part of the body force in steps that ``move`` has taken at once.
+    """Return the work [J] of the varying part of a body force in steps that ``move`` has taken at once.
 
     Args:
-        nodes: Masses ``(n,)`` [kg] that count, velocities ``(n, 3)`` [m/s] at the end, mobility ``(n, 3)``.
-        changes: ``(k, 3)`` [m/s^2] mean of this part in each step.
-        accelerations: ``(k, 3)`` [m/s^2] of the whole as each step begins.
-        step: dt [s].
+        nodes: Nodal masses in the energy balance (n,) [kg], velocities after the steps (n, 3) [m/s], mobility (n, 3) as
+            in ``move``.
+        changes: Mean of the varying part in each step, shape (k, 3) [m/s^2].
+        accelerations: Whole body acceleration as each step begins, shape (k, 3) [m/s^2].
+        step: Time step dt [s].
     """
     if not np.any(changes):
         return 0.0
@@ -108,7 +123,14 @@ def work_of_changes(nodes, changes, accelerations, step):
 
 @njit(cache=True)
 def spread_to_slaves(slave, master, weight, values):
-    """Overwrite the slaves' rows with the weighted sum of their masters' rows."""
+    """Overwrite the rows of slave nodes with the weighted sum of the rows of their masters.
+
+    Args:
+        slave: Slave nodes, shape (ns,).
+        master: Four masters of each slave, shape (ns, 4).
+        weight: Weights of the masters, shape (ns, 4).
+        values: Nodal vectors, such as displacements or velocities, shape (n, 3).
+    """
     for i in range(len(slave)):
         x = y = z = 0.0
         for k in range(4):
@@ -122,7 +144,14 @@ def spread_to_slaves(slave, master, weight, values):
 
 @njit(cache=True)
 def gather_from_slaves(slave, master, weight, values):
-    """Add the slaves' rows to their masters' rows by the transposed weights, then zero them."""
+    """Add the rows of slave nodes to the rows of their masters by the weights, then zero the slaves' rows.
+
+    Args:
+        slave: As in ``spread_to_slaves``.
+        master: As in ``spread_to_slaves``.
+        weight: As in ``spread_to_slaves``.
+        values: Nodal vectors, such as forces, shape (n, 3).
+    """
     for i in range(len(slave)):
         row = np.uintp(slave[i])
         x, y, z = values[row, 0], values[row, 1], values[row, 2]
@@ -136,7 +165,7 @@ def gather_from_slaves(slave, master, weight, values):
 
 @njit(cache=True)
 def pack(values, rows, buffer):
-    """Copy rows of ``values (n, 3)`` into a message ``(m, 3)``."""
+    """Copy the rows ``rows (m,)`` of nodal vectors ``values (n, 3)`` into a message ``buffer (m, 3)``."""
     for i in range(len(rows)):
         for c in range(3):
             buffer[i, c] = values[rows[i], c]
@@ -144,7 +173,7 @@ def pack(values, rows, buffer):
 
 @njit(cache=True)
 def unpack(buffer, rows, values):
-    """Copy a message ``(m, 3)`` into rows of ``values (n, 3)``."""
+    """Copy a message ``buffer (m, 3)`` into the rows ``rows (m,)`` of nodal vectors ``values (n, 3)``."""
     for i in range(len(rows)):
         for c in range(3):
             values[rows[i], c] = buffer[i, c]
@@ -152,16 +181,16 @@ def unpack(buffer, rows, values):
 
 @njit(cache=True)
 def sum_in_rank_order(rows, pointer, source, buffer, values):
-    """Replace each shared row by the sum over all its holders, in the order of their ranks.
+    """Replace each shared row by the sum over all ranks that have it, in the order of the ranks; not collective.
 
     The order makes the sums, and with them all copies of a node, equal to the last bit on all ranks.
 
     Args:
-        rows: ``(m,)`` shared nodes.
-        pointer: ``(m + 1,)`` first entry of each row in ``source``.
-        source: Row of ``buffer`` to add, -1 for this rank's own part.
-        buffer: ``(k, 3)`` received parts.
-        values: ``(n, 3)``.
+        rows: Local numbers of shared nodes, shape (m,).
+        pointer: First entry of each shared node in ``source``, and the number of entries, shape (m + 1,).
+        source: Row of ``buffer`` to add, -1 for this rank's part in ``values``, shape (entries,).
+        buffer: Parts received from other ranks, shape (k, 3).
+        values: Nodal vectors of this rank, shape (n, 3); the rows of shared nodes are replaced.
     """
     for i in range(len(rows)):
         row = rows[i]
@@ -177,7 +206,14 @@ def sum_in_rank_order(rows, pointer, source, buffer, values):
 
 @njit(cache=True)
 def add_impulse(rows, force, scale, impulse):
-    """Add scale times the force at some nodes to an impulse ``(len(rows), 3)``; rows past the force are left out."""
+    """Add a scalar times the force at some nodes to their impulses.
+
+    Args:
+        rows: Nodes, shape (k,); nodes with numbers of at least ``len(force)`` are skipped.
+        force: Force of the leading nodes, shape (n, 3) [N].
+        scale: Weight of the force, [s] for an impulse, [s^2] for its first moment in time.
+        impulse: Impulse of each node in ``rows``, shape (k, 3), added to.
+    """
     for i in range(len(rows)):
         if rows[i] < len(force):
             for c in range(3):
@@ -186,7 +222,12 @@ def add_impulse(rows, force, scale, impulse):
 
 @njit(cache=True)
 def add_ahead(ahead, force):
-    """Add ``ahead (n, 3)`` [N], the force stored for the following steps, to the force, and zero it."""
+    """Add ``ahead``, the force stored for the following steps, to the force, and zero it.
+
+    Args:
+        ahead: Shape (n, 3), or (0, 3) if no force acts at intervals [N].
+        force: Nodal force, shape (n, 3) [N], added to.
+    """
     total, rest = force.reshape(-1), ahead.reshape(-1)  # flat: loops that fill vectors
     for i in range(len(rest)):
         total[i] += rest[i]
@@ -195,9 +236,15 @@ def add_ahead(ahead, force):
 
 @njit(cache=True)
 def add_pushed(pushed, every, force, ahead):
-    """Distribute a force ``pushed (n, 3)`` [N] that acts once in ``every`` steps, and zero it.
+    """Distribute a force that acts once in several steps over these steps, and zero it.
 
-    One share is added to the force and the ``every - 1`` others to ``ahead``; all to the force if ``ahead`` is empty.
+    Args:
+        pushed: Force for one step, shape (n, 3) [N], zeroed.
+        every: Number of steps for which it acts.
+        force: Force of this step, shape (>= n, 3) [N]; receives one share, or all ``every`` shares if ``ahead`` is
+            empty.
+        ahead: Force for the following steps, shape (>= n, 3) [N], receives ``every - 1`` shares; or empty, shape (0,
+            3).
     """
     own, total, rest = pushed.reshape(-1), force.reshape(-1), ahead.reshape(-1)
     share = 1 if len(rest) else every
@@ -211,7 +258,7 @@ def add_pushed(pushed, every, force, ahead):
 
 @njit(cache=True)
 def add_rows(rows, values, total):
-    """Add some rows of ``values (n, 3)`` to the same rows of ``total``; each row at most once."""
+    """Add the rows ``rows (k,)`` of ``values (n, 3)`` to the same rows of ``total (n, 3)``; each row at most once."""
     for i in range(len(rows)):
         for c in range(3):
             total[rows[i], c] += values[rows[i], c]
@@ -227,12 +274,13 @@ def link_velocities(rows, velocity, force, terms, link):
         rows: Nodes of the interface, shape (k,).
         velocity: Velocity half a step back, shape (n, 3) [m/s].
         force: Nodal force, shape (n, 3) [N], added to.
-        terms: dt/2 / m [s/kg]; relative velocity of both models under a unit link [s/kg], infinite without a link;
+        terms: Half time step over mass, dt/2 / m [s/kg]; relative velocity of both models under a unit link [s/kg],
+            infinite without a link;
             target velocity [m/s]; weight of the work of the link [s]; shape (4, k, 3).
         link: Link forces of the previous step on entry, of this step on return, shape (n, 3) [N].
 
     Returns:
-        Work of the link over the step, by the mean of both ends [J].
+        Work of the link over the step, by the mean of both ends, scalar [J].
     """
     work = 0.0
     for i in range(len(rows)):
@@ -254,11 +302,12 @@ def add_damping(velocity, mobility, acceleration, coefficients, forces):
     reordered or fused.
 
     Args:
-        velocity: ``(n, 3)`` [m/s], v half a step back.
-        mobility: ``(n, 3)`` inverse mass [1/kg], zero where the velocity is prescribed, without drag.
-        acceleration: ``(3,)`` [m/s^2], g of the body force.
-        coefficients: c [1/s] and dt/2 [s].
-        forces: ``(n, 3)`` [N] twice: damping, on entry by the stiffness alone, and f without damping.
+        velocity: Velocity v half a step back, shape (n, 3) [m/s].
+        mobility: Inverse mass, zero where the velocity is prescribed and no drag acts, shape (n, 3) [1/kg].
+        acceleration: Acceleration g of the body force, shape (3,) [m/s^2].
+        coefficients: Damping coefficient c [1/s] and half time step dt/2 [s].
+        forces: Damping (stiffness-proportional on entry, total on return) and nodal force f (without damping on entry,
+            with it on return), two arrays of shape (n, 3) [N].
     """
     own, total = forces[0].reshape(-1), forces[1].reshape(-1)
     moving, inverse = velocity.reshape(-1), mobility.reshape(-1)
@@ -280,12 +329,12 @@ def add_damping(velocity, mobility, acceleration, coefficients, forces):
 
 @njit(cache=True, fastmath=FINITE)
 def power(runs, force, velocity):
-    """Return the power [W] of a force ``(n, 3)`` [N] at a velocity ``(n, 3)`` [m/s] of the nodes that count.
+    """Return the power [W], a scalar, of nodal forces at nodal velocities, summed over ranges of nodes.
 
     Args:
-        runs: ``(k, 2)`` first node of each run of nodes that count, and the one behind its last.
-        force: ``(n, 3)`` [N].
-        velocity: ``(n, 3)`` [m/s].
+        runs: First node of each range, and the node after its last, shape (k, 2).
+        force: Nodal force, shape (n, 3) [N].
+        velocity: Nodal velocity, shape (n, 3) [m/s].
     """
     total = 0.0
     for k in range(len(runs)):

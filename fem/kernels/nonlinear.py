@@ -51,7 +51,13 @@ class Path(NamedTuple):
 
 @njit(**LANE_OPTIONS)
 def small_increment(w, state):
-    """Take the strain increment from the displacement gradient; store the strain. Engineering shear."""
+    """Write the small-strain increments of sixteen elements at one point, and store the new strains.
+
+    Args:
+        w: Flat workspace; reads the displacement gradient at ``DEFORMATION``, writes the increment (xx, yy, zz, xy, yz,
+            xz, engineering shear) at ``INCREMENT``.
+        state: Flat state of the point, shape (208,); the strain at ``STRETCH`` is replaced.
+    """
     for lane in range(LANES):
         h = nine(w, DEFORMATION + lane)
         new = h[0], h[4], h[8], h[1] + h[3], h[5] + h[7], h[2] + h[6]
@@ -73,7 +79,7 @@ def small_increment(w, state):
 
 @njit(**LANE_OPTIONS)
 def add_identity(w):
-    """Turn a displacement gradient into a deformation gradient."""
+    """Add 1 to the displacement gradients of sixteen elements at ``DEFORMATION`` of a flat workspace, giving F."""
     for lane in range(LANES):
         w[DEFORMATION + lane] += 1.0
         w[DEFORMATION + 4 * LANES + lane] += 1.0
@@ -82,7 +88,14 @@ def add_identity(w):
 
 @njit(**LANE_OPTIONS)
 def start_rotation(w):
-    """Let the iteration for R start from F; return how many lanes are turned inside out."""
+    """Copy F of sixteen elements as the start value of the iteration for the rotation R.
+
+    Args:
+        w: Flat workspace; F is read at ``DEFORMATION`` and copied to ``ROTATION``.
+
+    Returns:
+        Number of elements that are turned inside out (det F <= 0), as a float.
+    """
     inverted = 0.0
     for lane in range(LANES):
         f = nine(w, DEFORMATION + lane)
@@ -93,7 +106,14 @@ def start_rotation(w):
 
 @njit(**LANE_OPTIONS)
 def improve_rotation(w):
-    """Take one Newton step X -> (X + X^-T) / 2 towards the rotation (Higham 1986); return its squared size."""
+    """Take one Newton step X -> (X + X^-T) / 2 towards the rotation of each of sixteen elements (Higham 1986).
+
+    Args:
+        w: Flat workspace; X at ``ROTATION``, a 3 x 3 matrix per element, is improved.
+
+    Returns:
+        Sum of the squared changes of all entries of all elements, a scalar.
+    """
     change = 0.0
     for lane in range(LANES):
         x = nine(w, ROTATION + lane)
@@ -108,7 +128,15 @@ def improve_rotation(w):
 
 @njit(cache=True)
 def rotate(w):
-    """Write the rotation of the polar decomposition; return whether no lane is turned inside out."""
+    """Write the rotations R of the polar decomposition F = R U of sixteen elements.
+
+    Args:
+        w: Flat workspace; reads F at ``DEFORMATION`` and writes R at ``ROTATION``, nine entries of sixteen elements
+            each.
+
+    Returns:
+        Whether no element is turned inside out (det F > 0); otherwise R is not valid.
+    """
     if start_rotation(w) > 0.0:
         return False
     for _ in range(POLAR_ITERATIONS):
@@ -119,7 +147,13 @@ def rotate(w):
 
 @njit(**LANE_OPTIONS)
 def stretch_increment(w, state):
-    """Take the strain increment from the stretch before and now; store the stretch. Engineering shear."""
+    """Write the finite strain increments of sixteen elements at one point, and store the new stretches.
+
+    Args:
+        w: Flat workspace; reads F at ``DEFORMATION`` and R at ``ROTATION``, writes the increment (xx, yy, zz, xy, yz,
+            xz, engineering shear) at ``INCREMENT``.
+        state: Flat state of the point, shape (208,); the stretch U at ``STRETCH`` is replaced.
+    """
     for lane in range(LANES):
         u = stretch(nine(w, ROTATION + lane), nine(w, DEFORMATION + lane))
         o = six(state, STRETCH + lane)
@@ -152,7 +186,12 @@ def stretch_increment(w, state):
 
 @njit(**LANE_OPTIONS)
 def stretch(r, f):
-    """Return U = R^T F, made symmetric."""
+    """Return the stretch U = R^T F, made symmetric, as six scalars: xx, yy, zz, xy, yz, xz.
+
+    Args:
+        r: Rotation R, nine scalars row by row.
+        f: Deformation gradient F, nine scalars row by row.
+    """
     return (
         r[0] * f[0] + r[3] * f[3] + r[6] * f[6],
         r[1] * f[1] + r[4] * f[4] + r[7] * f[7],
@@ -165,11 +204,12 @@ def stretch(r, f):
 
 @njit(**LANE_OPTIONS)
 def elastic_stress(w, state, elastic):
-    """Add C times the strain increment to the stress; write its von Mises stress.
+    """Add C times the strain increment to the stress of sixteen elements at one point, and write the von Mises stress.
 
     Args:
-        w: Workspace.
-        state: Of the point.
+        w: Flat workspace; reads the increment at ``INCREMENT``, writes the von Mises stress [Pa] at ``MISES``.
+        state: Flat state of the point, entry k of element e at ``16 * k + e``; the stress at ``STRESS`` is updated
+            [Pa].
         elastic: ``(9,)`` [Pa]: C_xx, C_yy, C_zz, C_xy, C_yz, C_xz (normal), G_xy, G_yz, G_xz.
     """
     for lane in range(LANES):
@@ -182,7 +222,13 @@ def elastic_stress(w, state, elastic):
 
 @njit(**LANE_OPTIONS)
 def nominal_stress_small(w, state, weight):
-    """Write the stress times the weight of the point."""
+    """Write the stress of sixteen elements at one point times the volume of the point, as 3 x 3 matrices.
+
+    Args:
+        w: Flat workspace, written at ``NOMINAL`` [J].
+        state: Flat state of the point; reads the stress [Pa].
+        weight: Volume of the point in each element, shape (16,) [m^3].
+    """
     for lane in range(LANES):
         s = full(six(state, STRESS + lane))
         for k in range(9):
@@ -191,7 +237,13 @@ def nominal_stress_small(w, state, weight):
 
 @njit(**LANE_OPTIONS)
 def nominal_stress_finite(w, state, weight):
-    """Write the nominal stress P = R s U^-1 times the weight of the point."""
+    """Write the nominal stress P = R s U^-1 of sixteen elements at one point times the volume of the point.
+
+    Args:
+        w: Flat workspace; reads R at ``ROTATION``, writes at ``NOMINAL`` [J].
+        state: Flat state of the point; reads the stress s [Pa] and the stretch U.
+        weight: Initial volume of the point in each element, shape (16,) [m^3].
+    """
     for lane in range(LANES):
         u = six(state, STRETCH + lane)
         c = cofactor_symmetric(u)

@@ -59,7 +59,15 @@ class Blocks(NamedTuple):
 
 @njit(**LANE_OPTIONS)
 def write_gradient(nodes, values, gradient, w):
-    """Write the gradient of nodal values ``(48 k,)``; ``nodes`` is any tuple of k entries."""
+    """Write the gradient of a nodal vector field at one point of sixteen elements with k nodes.
+
+    Args:
+        nodes: Any tuple of k entries; only its length counts, which must be known at compilation.
+        values: Nodal vectors such as displacements [m], component c at node a of element e at ``16 * (3 a + c) + e``,
+            shape (48 k,).
+        gradient: Gradients of the shape functions at the point, in the same order, shape (48 k,) [1/m].
+        w: Flat workspace; the 3 x 3 gradients are written to its first 144 entries.
+    """
     for i in range(3):
         row, source = w[3 * LANES * i :], values[LANES * i :]
         for lane in range(LANES):
@@ -74,7 +82,14 @@ def write_gradient(nodes, values, gradient, w):
 
 @njit(**LANE_OPTIONS)
 def add_point_force(gradient, w, force):
-    """Add P b_a to the force of each node ``(48 k,)``."""
+    """Add the force P b_a of one point to each node a of sixteen elements.
+
+    Args:
+        gradient: Gradients b_a of the shape functions at the point, order as in ``write_gradient``, shape (48 k,)
+            [1/m].
+        w: Flat workspace; reads the nominal stress times volume at ``NOMINAL`` [J].
+        force: Nodal forces in the same order, shape (48 k,) [N], added to.
+    """
     for start in range(0, len(force), 3 * LANES):
         b, f = gradient[start : start + 3 * LANES], force[start : start + 3 * LANES]
         for lane in range(LANES):
@@ -87,7 +102,16 @@ def add_point_force(gradient, w, force):
 
 @njit(cache=True)
 def strain_increment(w, state, finite):
-    """Write the strain increment of a point; return whether no lane is turned inside out."""
+    """Write the strain increments of sixteen elements at one point from the displacement gradients.
+
+    Args:
+        w: Flat workspace; reads the displacement gradient at ``DEFORMATION``, which finite kinematics turn into F.
+        state: Flat state of the point, shape (208,); its strain or stretch is updated.
+        finite: Whether rotations and strains are finite.
+
+    Returns:
+        Whether no element is turned inside out; otherwise the increment is not written.
+    """
     if not finite:
         small_increment(w, state)
         return True
@@ -100,7 +124,18 @@ def strain_increment(w, state, finite):
 
 @njit(cache=True)
 def add_point(blocks, b, point, path, w):
-    """Write the weighted nominal stress of a point of a block from its displacement gradient."""
+    """Update stress and state of sixteen elements at one point, and write the nominal stress times volume.
+
+    Args:
+        blocks: ``Blocks`` of elements; state and plastic work of the point are updated.
+        b: Number of the block.
+        point: Number of the point in the elements.
+        path: ``Path``, kinematics and time step.
+        w: Flat workspace with the displacement gradients at ``DEFORMATION``; written at ``NOMINAL`` [J].
+
+    Returns:
+        Whether no element is turned inside out; otherwise the stress is not written.
+    """
     state, material, pattern = blocks.state[b, point], blocks.material[b], blocks.pattern[b]
     upright = strain_increment(w, state, path.finite)
     if upright:
@@ -117,17 +152,17 @@ def add_point(blocks, b, point, path, w):
 
 @njit(cache=True)
 def add_gradient_force(blocks, nodes, path, displacement, force):
-    """Subtract the internal force of elements with stored gradients; move their state on by a step.
+    """Subtract the internal force of elements with stored gradients (tetrahedra), and advance their state by a step.
 
     Args:
-        blocks: The elements.
-        nodes: Tuple of k entries, k nodes an element.
-        path: Kinematics and step.
-        displacement: ``(n, 3)`` [m].
-        force: ``(n, 3)`` [N], added to.
+        blocks: ``Blocks``: the elements in blocks of sixteen; state and plastic work are updated.
+        nodes: Tuple with as many entries as an element has nodes; only its length counts.
+        path: ``Path``: small or finite kinematics, and the time step of rate-dependent laws [s].
+        displacement: Nodal displacement after the step, shape (n, 3) [m].
+        force: Nodal force, shape (n, 3) [N], subtracted from.
 
     Returns:
-        ``FINE``, or the first block with an element that is turned inside out; then the force is not complete.
+        ``FINE`` (-1), or the first block with an element that is turned inside out; then the force is not complete.
     """
     w = np.empty(WORK_SLOTS)
     values, result = np.empty(3 * LANES * len(nodes)), np.empty(3 * LANES * len(nodes))

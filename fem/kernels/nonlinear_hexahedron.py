@@ -103,7 +103,12 @@ class HexahedronBlocks(NamedTuple):
 
 @njit(**LANE_OPTIONS)
 def write_centre(inverse, w):
-    """Write the deformation of the centre from the transformed displacements."""
+    """Write F at the centres of sixteen elements, at ``w[DEFORMATION:]``.
+
+    Args:
+        inverse: Inverse of the transformed positions at rest, nine entries of sixteen elements, shape (144,) [1/m].
+        w: Flat workspace with transformed displacements [m].
+    """
     for lane in range(LANES):
         m, x, y, z = nine(inverse, lane), three(w, X + lane), three(w, Y + lane), three(w, Z + lane)
         put_nine(
@@ -125,14 +130,14 @@ def write_centre(inverse, w):
 
 @njit(**LANE_OPTIONS)
 def add_corners(corners, p, w):
-    """Turn displacements into positions."""
+    """Add the positions at rest, row p of ``corners (np, 336)`` [m], to the displacements in workspace ``w``."""
     for k in range(CORNERS):
         w[X + k] += corners[p, k]
 
 
 @njit(**LANE_OPTIONS)
 def turn_back(w):
-    """Turn positions into the frame R."""
+    """Rotate the transformed positions in workspace ``w`` into the frame R: x becomes R^T x."""
     for k in range(X, MODES, 3 * LANES):
         for lane in range(LANES):
             put_three(w, k + lane, applied(transposed(nine(w, ROTATION + lane)), three(w, k + lane)))
@@ -140,7 +145,7 @@ def turn_back(w):
 
 @njit(**LANE_OPTIONS)
 def turn(w):
-    """Turn forces out of the frame R."""
+    """Rotate the transformed forces in workspace ``w`` out of the frame R: f becomes R f."""
     for k in range(X, MODES, 3 * LANES):
         for lane in range(LANES):
             put_three(w, k + lane, applied(nine(w, ROTATION + lane), three(w, k + lane)))
@@ -148,7 +153,7 @@ def turn(w):
 
 @njit(**LANE_OPTIONS)
 def move_place(w, place, b):
-    """Write middle and change of positions from those before and after the step; keep the latter."""
+    """Write midpoint and change of the positions in workspace ``w``; store them in row b of ``place (nb, 336)`` [m]."""
     for k in range(CORNERS):
         new, old = w[X + k], place[b, k]
         w[CHANGE + X + k] = new - old
@@ -158,11 +163,11 @@ def move_place(w, place, b):
 
 @njit(**LANE_OPTIONS)
 def write_strains(edges, points):
-    """Write the increments of the compatible strain and their traces at the Gauss points.
+    """Write the increments of the compatible strain (engineering shear) and their traces at the Gauss points.
 
     Args:
-        edges: Derivatives of the midpoint positions, followed by the derivatives of their change.
-        points: ``(8, 16 * 7)``.
+        edges: Derivatives of the midpoint positions, followed by those of their change, shape (1152,) [m].
+        points: Written: six strains and the trace of sixteen elements at each Gauss point, shape (8, 112).
     """
     for g in range(8):
         p, q, r = places(g)
@@ -185,7 +190,7 @@ def write_strains(edges, points):
 
 @njit(**LANE_OPTIONS)
 def fit_dilatation(points, fitted):
-    """Replace the dilatations by their fits."""
+    """Replace the dilatations in strains ``points (8, 112)`` by their fits ``fitted (128,)`` at the Gauss points."""
     for g in range(8):
         for lane in range(LANES):
             third = (fitted[LANES * g + lane] - points[g, TRACE + lane]) / 3.0
@@ -196,14 +201,14 @@ def fit_dilatation(points, fitted):
 
 @njit(**LANE_OPTIONS)
 def move_points(w, points, reciprocal, state, elastic):
-    """Move the stress of all Gauss points on by an elastic step.
+    """Advance the stress of all Gauss points of sixteen elements by an elastic step.
 
     Args:
-        w: Workspace, with the strains of the modes.
-        points: Strain increments of ``write_strains``, added to; squares of the equivalent stresses replace the traces.
-        reciprocal: ``(8, 16)`` of the weights.
-        state: ``(8, 16 * 7)``.
-        elastic: Nine constants.
+        w: Flat workspace, with the strains of the modes at ``SUMS``.
+        points: Strains of ``write_strains``, added to; squared von Mises stresses replace the traces, shape (8, 112).
+        reciprocal: Reciprocals of the weights, shape (8, 16) [1/m^3].
+        state: Stress [Pa] and plastic strain, shape (8, 112); the stress is updated.
+        elastic: Nine scalars [Pa] as in ``kernels.nonlinear.elastic_stress``.
     """
     for g in range(8):
         x, y, z = GAUSS[g, 0], GAUSS[g, 1], GAUSS[g, 2]
@@ -230,7 +235,12 @@ def move_points(w, points, reciprocal, state, elastic):
 
 @njit(**LANE_OPTIONS)
 def count_yielding(points, limit):
-    """Return at how many Gauss points the equivalent stress is above a limit."""
+    """Return at how many Gauss points of 16 elements the von Mises stress exceeds a limit, as a float.
+
+    Args:
+        points: Squared von Mises stresses of ``move_points`` in its last 16 columns, shape (8, 112) [Pa^2].
+        limit: Positive scalar [Pa].
+    """
     count, square = 0.0, limit * limit
     for g in range(8):
         for lane in range(LANES):
@@ -240,7 +250,11 @@ def count_yielding(points, limit):
 
 @njit(cache=True)
 def flow(blocks, b, points, step, w):
-    """Return the stresses of a block to the yield surface; ``w`` is a workspace of ``kernels.nonlinear``."""
+    """Return the stresses of block ``b`` of ``HexahedronBlocks`` to the yield surface, and add the plastic work.
+
+    ``points`` are strains and squared von Mises stresses of ``move_points (8, 112)``, ``step`` is dt [s], ``w`` is a
+    flat workspace of ``kernels.nonlinear``, overwritten.
+    """
     state, weight, work = blocks.state[b], blocks.weight[blocks.pattern[b]], blocks.plastic_work[b]
     law = law_of(blocks.plastic, blocks.material[b], step)
     for g in range(8):
@@ -254,7 +268,7 @@ def flow(blocks, b, points, step, w):
 
 @njit(**LANE_OPTIONS)
 def write_pressures(state, points):
-    """Write the pressures of the Gauss points, positive in tension."""
+    """Write the mean stresses (positive in tension) of ``state (8, 112)`` into ``points[:, TRACE:]`` [Pa]."""
     for g in range(8):
         for lane in range(LANES):
             points[g, TRACE + lane] = (state[g, lane] + state[g, LANES + lane] + state[g, 2 * LANES + lane]) / 3.0
@@ -262,15 +276,15 @@ def write_pressures(state, points):
 
 @njit(**LANE_OPTIONS)
 def write_forces(edges, load, forces):
-    """Write the forces on the derivatives of x^ at the Gauss points.
+    """Write the forces on the derivatives of x^ at the Gauss points of sixteen elements.
 
     Args:
-        edges: Derivatives after the step.
-        load: State ``(8, 16 * 7)``, pressures among ``points``, their fit, weights.
-        forces: ``(8, 16 * 9)``.
+        edges: Derivatives of the positions after the step, shape (>= 576,) [m].
+        load: State (8, 112), ``points`` with mean stresses (8, 112), their fit (128,), weights (8, 16) [m^3].
+        forces: Written, shape (8, 144) [J/m]; along x, y, z, three components each.
 
     Returns:
-        At how many points and lanes it is not upright.
+        Number of Gauss points of all elements that are turned inside out, as a float.
     """
     state, points, fitted, weight = load
     wrong = 0.0
@@ -298,14 +312,14 @@ def write_forces(edges, load, forces):
 
 @njit(**LANE_OPTIONS)
 def copy_corners(source, b, w, at):
-    """Write positions, of a row of ``source (., 16 * 21)``."""
+    """Copy transformed positions, row ``b`` of ``source (., 336)`` [m], into workspace ``w`` from slot ``at`` on."""
     for k in range(CORNERS):
         w[at + X + k] = source[b, k]
 
 
 @njit(**LANE_OPTIONS)
 def constants_of(elastic, m):
-    """Return the nine constants of a material."""
+    """Return row ``m`` of the elastic constants ``(nm, 9)`` [Pa] as nine scalars."""
     return (
         elastic[m, 0],
         elastic[m, 1],
@@ -321,16 +335,16 @@ def constants_of(elastic, m):
 
 @njit(cache=True)
 def add_hexahedron_force(blocks, path, displacement, force):
-    """Subtract the internal force of hexahedra with incompatible modes; move their state on by a step.
+    """Subtract the internal force of hexahedra with incompatible modes, and advance their state by a step.
 
     Args:
-        blocks: The elements.
-        path: Kinematics and step.
-        displacement: ``(n, 3)`` [m].
-        force: ``(n, 3)`` [N], added to.
+        blocks: ``HexahedronBlocks``; state, positions, work and energy are updated.
+        path: ``Path``: small or finite kinematics, and the time step of rate-dependent laws [s].
+        displacement: Nodal displacement after the step, shape (n, 3) [m].
+        force: Nodal force, shape (n, 3) [N], subtracted from.
 
     Returns:
-        ``FINE``, or the first block with an element that is turned inside out; then the force is not complete.
+        ``FINE`` (-1), or the first block with an element turned inside out; then the force is not complete.
     """
     w, edges, point = np.zeros(ALL_SLOTS), np.empty(2 * EDGES), np.empty(WORK_SLOTS)
     points, forces, fitted = np.empty((8, POINT)), np.empty((8, 9 * LANES)), np.empty(8 * LANES)

@@ -33,7 +33,12 @@ MIDDLE, CHANGE, NORMAL, BEFORE, AFTER, SUMS, RESIDUAL, OPERATOR, ALL_SLOTS = (
 
 @njit(**LANE_OPTIONS)
 def write_normals(w):
-    """Write n_k, the gradients of the parent coordinates at the centre in the middle of the step."""
+    """Write n_k, the gradients of the parent coordinates at the centres of sixteen hexahedra in the middle of the step.
+
+    Args:
+        w: Flat workspace of ``ALL_SLOTS`` entries; reads positions at ``MIDDLE`` [m], writes three vectors at
+            ``NORMAL``.
+    """
     for lane in range(LANES):
         a, b, c = three(w, MIDDLE + X + lane), three(w, MIDDLE + Y + lane), three(w, MIDDLE + Z + lane)
         u, v, t = cross(b, c), cross(c, a), cross(a, b)
@@ -47,7 +52,14 @@ def write_normals(w):
 
 @njit(**LANE_OPTIONS)
 def write_sums(values, w, at):
-    """Write the sums ``(16 * 18,)`` of xi_k s over the Gauss points, of six values s each: ``(8, 96 or more)``."""
+    """Write the sums of xi_k s, k = 1 to 3, over the Gauss points of sixteen hexahedra, for six scalars s per point.
+
+    Args:
+        values: Stresses or strain increments of each Gauss point, entry i of element e in column ``16 * i + e``, shape
+            (8, >= 96).
+        w: Flat workspace, of which 288 entries are written: six sums for each k.
+        at: Position of the first sum in ``w``: ``BEFORE``, ``AFTER`` or ``SUMS``.
+    """
     for i in range(6 * LANES):
         a, b, c, d = values[0, i], values[1, i], values[2, i], values[3, i]
         e, f, g, h = values[4, i], values[5, i], values[6, i], values[7, i]
@@ -58,9 +70,14 @@ def write_sums(values, w, at):
 
 @njit(**LANE_OPTIONS)
 def write_trial(w, elastic):
-    """Write the forces on the modes after an elastic step with modes at rest: (S_k + C T_k) n_k.
+    """Write the forces on the modes of sixteen hexahedra after an elastic step with modes at rest: (S_k + C T_k) n_k.
 
     S and T are the sums over the Gauss points of the stresses before the step and of the strain increments.
+
+    Args:
+        w: Flat workspace of ``ALL_SLOTS`` entries; reads S at ``BEFORE``, T at ``SUMS``, n_k at ``NORMAL``, writes at
+            ``RESIDUAL``.
+        elastic: Nine scalars [Pa] as in ``kernels.nonlinear.elastic_stress``.
     """
     for lane in range(LANES):
         u, v, t = three(w, NORMAL + lane), three(w, NORMAL + 3 * LANES + lane), three(w, NORMAL + 6 * LANES + lane)
@@ -74,7 +91,7 @@ def write_trial(w, elastic):
 
 @njit(**LANE_OPTIONS)
 def strain_of(a, n):
-    """Return minus the symmetric part of a (x) n, six entries with engineering shear."""
+    """Return the strain -sym(a (x) n) of two vectors as six scalars xx, yy, zz, xy, yz, xz (engineering shear)."""
     return (
         -a[0] * n[0],
         -a[1] * n[1],
@@ -87,7 +104,13 @@ def strain_of(a, n):
 
 @njit(**LANE_OPTIONS)
 def add_remainder(w, energy):
-    """Subtract the work of the mean forces of a step on the modes from ``energy (16,)`` [J]."""
+    """Subtract the work of the residual forces on the modes in a step from the hourglass energy of sixteen hexahedra.
+
+    Args:
+        w: Flat workspace of ``ALL_SLOTS`` entries: sums of the stresses at ``BEFORE`` and ``AFTER`` [Pa], strains of
+            the modes at ``SUMS``.
+        energy: Hourglass energy, shape (16,) [J], updated.
+    """
     for lane in range(LANES):
         total = 0.0
         for k in range(0, 18 * LANES, LANES):
@@ -97,7 +120,13 @@ def add_remainder(w, energy):
 
 @njit(**LANE_OPTIONS)
 def elastic_block(m, n, elastic):
-    """Return B(m)^T C B(n), B the strain of a field with gradient m: 3 x 3."""
+    """Return B(m)^T C B(n) as nine scalars, row by row; B(m) is the strain of a vector field with gradient m.
+
+    Args:
+        m: Gradient of the first field, three scalars.
+        n: Gradient of the second field, three scalars.
+        elastic: Nine scalars [Pa] as in ``kernels.nonlinear.elastic_stress``.
+    """
     xx, yy, zz, xy, yz, xz, gxy, gyz, gxz = elastic
     return (
         xx * m[0] * n[0] + gxy * m[1] * n[1] + gxz * m[2] * n[2],
@@ -114,7 +143,14 @@ def elastic_block(m, n, elastic):
 
 @njit(**LANE_OPTIONS)
 def write_operator(w, coupling, elastic):
-    """Write the six different 3 x 3 blocks of the modes' elastic operator, order xx yy zz xy yz xz."""
+    """Write the elastic operator of the three modes of sixteen hexahedra as six 3 x 3 blocks: 11 22 33 12 23 13.
+
+    Args:
+        w: Flat workspace of ``ALL_SLOTS`` entries; reads n_k at ``NORMAL``, writes the blocks at ``OPERATOR``.
+        coupling: Sums of xi_k xi_l / w over the Gauss points in the same order, six of sixteen elements, shape (96,)
+            [1/m^3].
+        elastic: Nine scalars [Pa] as in ``kernels.nonlinear.elastic_stress``.
+    """
     for lane in range(LANES):
         u, v, t = three(w, NORMAL + lane), three(w, NORMAL + 3 * LANES + lane), three(w, NORMAL + 6 * LANES + lane)
         c = six(coupling, lane)
@@ -128,14 +164,14 @@ def write_operator(w, coupling, elastic):
 
 @njit(**LANE_OPTIONS)
 def inverse(m):
-    """Return the inverse of a 3 x 3 matrix."""
+    """Return the inverse of a 3 x 3 matrix; both are nine scalars, row by row."""
     c = cofactor(m)
     return scaled(1.0 / determinant(m, c), transposed(c))
 
 
 @njit(**LANE_OPTIONS)
 def minus(m, n):
-    """Return the difference of two matrices."""
+    """Return m - n for two 3 x 3 matrices of nine scalars each."""
     return (
         m[0] - n[0], m[1] - n[1], m[2] - n[2], m[3] - n[3], m[4] - n[4],
         m[5] - n[5], m[6] - n[6], m[7] - n[7], m[8] - n[8],
@@ -144,7 +180,7 @@ def minus(m, n):
 
 @njit(**LANE_OPTIONS)
 def less(v, m, u):
-    """Return v - m u."""
+    """Return v - m u as three scalars; m is a 3 x 3 matrix (nine scalars, row by row), v and u are vectors."""
     p = applied(m, u)
     return v[0] - p[0], v[1] - p[1], v[2] - p[2]
 

@@ -96,21 +96,33 @@ class OnePointBlocks(NamedTuple):
 
 @njit(**LANE_OPTIONS)
 def do_not_turn(w):
-    """Write R = 1."""
+    """Write the identity as rotation R of sixteen elements, at ``w[ROTATION:]`` of a flat workspace."""
     for lane in range(LANES):
         put_nine(w, ROTATION + lane, IDENTITY)
 
 
 @njit(**LANE_OPTIONS)
 def subtract_slip(w, slip):
-    """Replace g^ by its elastic part."""
+    """Subtract the plastic slip from the hourglass amplitudes of sixteen elements.
+
+    Args:
+        w: Flat workspace; the twelve amplitudes g^ [m] at ``A`` become their elastic part g^ - slip.
+        slip: Slip in the same order, entry k of element e at ``16 * k + e``, shape (192,) [m].
+    """
     for k in range(AMPLITUDES):
         w[A + k] -= slip[k]
 
 
 @njit(**LANE_OPTIONS)
 def write_hourglass_energy(w, slip, energy):
-    """Write (g^ - slip) . H (g^ - slip) / 2, and g^ in the place of its elastic part."""
+    """Compute the hourglass energy (g^ - slip) . H (g^ - slip) / 2 of sixteen elements, and restore g^.
+
+    Args:
+        w: Flat workspace with the elastic amplitudes [m] at ``A``, to which the slip is added back, and the hourglass
+            forces [N] at ``A + SHIFT``.
+        slip: Plastic slip of the amplitudes, shape (192,) [m].
+        energy: Written, shape (16,) [J].
+    """
     for lane in range(LANES):
         total = 0.0
         for k in range(0, AMPLITUDES, LANES):
@@ -122,13 +134,26 @@ def write_hourglass_energy(w, slip, energy):
 
 @njit(cache=True, error_model="numpy")
 def carried(strength, mises):
-    """Return the largest hourglass stress [Pa] of a section, given its yield stress and von Mises stress [Pa]."""
+    """Return the largest hourglass stress that a section carries next to its axial stress, a scalar [Pa].
+
+    Args:
+        strength: Yield stress, positive scalar [Pa].
+        mises: Von Mises stress at the centre, scalar [Pa].
+    """
     return BENDING_STRENGTH * strength * max(LEAST_STRENGTH, 1.0 - (mises / strength) ** 2)
 
 
 @njit(**LANE_OPTIONS)
 def may_slip(w, energy, weight, first, young):
-    """Return the number of lanes whose hourglass stress exceeds the limit of a section at its first yield stress."""
+    """Return how many of sixteen elements exceed the hourglass limit at the first yield stress, as a float.
+
+    Args:
+        w: Flat workspace with the von Mises stress [Pa] of the centres.
+        energy: Hourglass energy, shape (16,) [J].
+        weight: Volume, shape (16,) [m^3].
+        first: First yield stress, scalar [Pa].
+        young: Young's modulus, scalar [Pa].
+    """
     count = 0.0
     for lane in range(LANES):
         ratio = w[DEFORMATION + MISES + lane] / first
@@ -140,9 +165,15 @@ def may_slip(w, energy, weight, first, young):
 
 @njit(cache=True, error_model="numpy")
 def hourglass_flow(blocks, b, before, w):
-    """Reduce hourglass forces to the limit of a section; ``before (16,)`` [J] is their energy before the step.
+    """Reduce the hourglass forces of a block of sixteen elements to the limit of a section; the excess becomes slip.
 
     Plastic work is the slip times the mean force of the step, without the rotation of the force within it.
+
+    Args:
+        blocks: ``OnePointBlocks``; hourglass energy, slip and plastic work of the block are updated.
+        b: Number of the block.
+        before: Hourglass energy before the step, shape (16,) [J].
+        w: Flat workspace with amplitudes at ``A`` [m] and hourglass forces at ``A + SHIFT`` [N], which are reduced.
     """
     law, young = blocks.plastic[blocks.material[b]], blocks.modulus[blocks.material[b]]
     state, weight, slip = blocks.state[b, 0], blocks.weight[blocks.pattern[b], 0], blocks.slip[b]
@@ -163,7 +194,13 @@ def hourglass_flow(blocks, b, before, w):
 
 @njit(**LANE_OPTIONS)
 def write_nominal_small(w, state, weight):
-    """Replace F by the stress times the volume."""
+    """Replace F of sixteen elements by the stress times the volume, for small kinematics.
+
+    Args:
+        w: Flat workspace, written at ``DEFORMATION`` [J].
+        state: Flat state of the centres, shape (208,); reads the stress [Pa].
+        weight: Volume, shape (16,) [m^3].
+    """
     for lane in range(LANES):
         s, v = six(state, STRESS + lane), weight[lane]
         put_nine(w, DEFORMATION + lane, full((v * s[0], v * s[1], v * s[2], v * s[3], v * s[4], v * s[5])))
@@ -171,7 +208,13 @@ def write_nominal_small(w, state, weight):
 
 @njit(**LANE_OPTIONS)
 def write_nominal_finite(w, state, weight):
-    """Replace F by P, given R, g^ and the hourglass forces."""
+    """Replace F of sixteen elements by P, the force on F, for finite kinematics.
+
+    Args:
+        w: Flat workspace with R, amplitudes g^ [m] and hourglass forces [N]; written at ``DEFORMATION`` [J].
+        state: Flat state of the centres, shape (208,); reads stress [Pa] and stretch.
+        weight: Initial volume, shape (16,) [m^3].
+    """
     for lane in range(LANES):
         s, u = six(state, STRESS + lane), six(state, STRETCH + lane)
         c = cofactor_symmetric(u)
@@ -187,7 +230,17 @@ def write_nominal_finite(w, state, weight):
 
 @njit(cache=True)
 def move_centre(blocks, b, path, w):
-    """Move the stress of the centres of a block on by a step; return whether no element is turned inside out."""
+    """Advance the stress at the centres of a block of sixteen elements by a step.
+
+    Args:
+        blocks: ``OnePointBlocks``; state and plastic work of the block are updated.
+        b: Number of the block.
+        path: ``Path``, kinematics and time step.
+        w: Flat workspace with F (finite) or the displacement gradient (small) at ``DEFORMATION``.
+
+    Returns:
+        Whether no element is turned inside out; otherwise the state is unchanged.
+    """
     state, material, point = blocks.state[b, 0], blocks.material[b], w[DEFORMATION:]
     if path.finite:
         if not rotate(point):
@@ -205,7 +258,15 @@ def move_centre(blocks, b, path, w):
 
 @njit(cache=True)
 def move_hourglass(blocks, b, unit, before, w):
-    """Write amplitudes and hourglass forces of a block; ``before (16,)`` is overwritten."""
+    """Write hourglass amplitudes and forces of a block of sixteen elements, and update energy and slip.
+
+    Args:
+        blocks: ``OnePointBlocks``; hourglass energy, slip and plastic work of the block are updated.
+        b: Number of the block.
+        unit: 1.0 for finite kinematics (the workspace has F), 0.0 for small ones (it has F - 1).
+        before: Workspace of shape (16,), overwritten.
+        w: Flat workspace; amplitudes [m] are written at ``A``, forces [N] at ``A + SHIFT``.
+    """
     k, energy, slip = blocks.constants[blocks.pattern[b]], blocks.hourglass_energy[b], blocks.slip[b]
     weight, material = blocks.weight[blocks.pattern[b], 0], blocks.material[b]
     write_amplitudes(k, w, unit)
@@ -220,16 +281,16 @@ def move_hourglass(blocks, b, unit, before, w):
 
 @njit(cache=True)
 def add_one_point_force(blocks, path, displacement, force):
-    """Subtract the internal force of one-point hexahedra; move their state on by a step.
+    """Subtract the internal force of one-point hexahedra, and advance their state by a step.
 
     Args:
-        blocks: The elements.
-        path: Kinematics and step.
-        displacement: ``(n, 3)`` [m].
-        force: ``(n, 3)`` [N], added to.
+        blocks: ``OnePointBlocks``: the elements in blocks of sixteen; state, slip, energies and work are updated.
+        path: ``Path``: small or finite kinematics, and the time step of rate-dependent laws [s].
+        displacement: Nodal displacement after the step, shape (n, 3) [m].
+        force: Nodal force, shape (n, 3) [N], subtracted from.
 
     Returns:
-        ``FINE``, or the first block with an element that is turned inside out; then the force is not complete.
+        ``FINE`` (-1), or the first block with an element that is turned inside out; then the force is not complete.
     """
     w, before, unit = np.empty(SLOTS), np.empty(LANES), 1.0 if path.finite else 0.0
     do_not_turn(w)

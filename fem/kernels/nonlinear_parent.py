@@ -23,20 +23,20 @@ PAIRS = ((0, 1, 2, 3, 4, 5, 6, 7), (0, 2, 1, 3, 4, 6, 5, 7), (0, 4, 1, 5, 2, 6, 
 
 @njit(**LANE_OPTIONS)
 def places(g):
-    """Return where the derivatives along x, y, z of a Gauss point begin."""
+    """Return the positions in ``edges`` of the derivatives along x, y, z at Gauss point ``g`` (0 to 7)."""
     x, y, z = g & 1, (g >> 1) & 1, (g >> 2) & 1
     return LANES * (3 * y + 6 * z), LANES * (12 + 3 * x + 6 * z), LANES * (24 + 3 * x + 6 * y)
 
 
 @njit(**LANE_OPTIONS)
 def write_edges(w, field, edges, start):
-    """Write the derivatives of a field.
+    """Write the derivatives of a vector field at the Gauss points of sixteen hexahedra.
 
     Args:
-        w: Workspace.
-        field: Where its transformed values ``(16 * 24,)`` begin there.
-        edges: ``(>= start + 16 * 36,)``.
-        start: Where to write.
+        w: Flat workspace with the transformed nodal values of the field, 24 entries of sixteen elements.
+        field: Position of these values in ``w``.
+        edges: Written: derivatives in the order of the module, 36 entries of sixteen elements, shape (>= start + 576,).
+        start: Position of the first derivative in ``edges``.
     """
     for d in range(3):
         own, first, second = LINES[d]
@@ -49,7 +49,12 @@ def write_edges(w, field, edges, start):
 
 @njit(**LANE_OPTIONS)
 def write_modes(forces, w):
-    """Write the forces on the transformed values of forces ``(8, 16 * 9)`` on the derivatives at the Gauss points."""
+    """Write the forces on the transformed nodal values of sixteen hexahedra, the transpose of ``write_edges``.
+
+    Args:
+        forces: Forces on the derivatives at each Gauss point: along x, y, z, three components each, shape (8, 144) [J].
+        w: Flat workspace; its first 384 entries are overwritten.
+    """
     for k in range(24 * LANES):
         w[k] = 0.0
     for d in range(3):
@@ -67,14 +72,15 @@ def write_modes(forces, w):
 
 @njit(**LANE_OPTIONS)
 def write_fit(values, at, weight, basis, fitted):
-    """Write the least-squares fit of values at the Gauss points by four orthonormal functions.
+    """Write the least-squares fit of scalars at the Gauss points of sixteen hexahedra by four linear functions.
 
     Args:
-        values: ``(8, >= at + 16)``.
-        at: Which of their entries.
-        weight: ``(8, 16)``.
-        basis: ``(16 * 32,)`` the functions, orthonormal under the weights.
-        fitted: ``(16 * 8,)``.
+        values: Row of each Gauss point, shape (8, >= at + 16).
+        at: Column of the scalar of the first element.
+        weight: Volume of each Gauss point, shape (8, 16) [m^3].
+        basis: Four functions at the eight points, orthonormal under the weights, function by function, point by point,
+            shape (512,).
+        fitted: Written: fitted value at point g of element e at ``16 * g + e``, shape (128,).
     """
     for k in range(8 * LANES):
         fitted[k] = 0.0

@@ -27,25 +27,25 @@ FLOW, LOGARITHM, CEILING, BEFORE, INVERSE = (NOMINAL + LANES * k for k in range(
 
 
 def bit_pattern(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    """Return the value of other type with the same bits."""
+    """Generate the LLVM bitcast of a value: ``bits_of`` and ``float_of`` return it to Numba as their code generator."""
     return builder.bitcast(arguments[0], context.get_value_type(signature.return_type))
 
 
 @intrinsic
 def bits_of(context: Any, value: Any) -> Any:
-    """Return the bits of a float as an integer."""
+    """Return the 64 bits of a float as an int64; a Numba intrinsic, called in kernels as ``bits_of(value)``."""
     return types.int64(types.float64), bit_pattern
 
 
 @intrinsic
 def float_of(context: Any, bits: Any) -> Any:
-    """Return the float of the bits of an integer."""
+    """Return the float64 with the 64 bits of an int64; a Numba intrinsic, called in kernels as ``float_of(bits)``."""
     return types.float64(types.int64), bit_pattern
 
 
 @njit(**LANE_OPTIONS)
 def log(x):
-    """Return ln x of a positive normal number: x = 2^k m, ln m = 2 artanh((m - 1) / (m + 1)) by its series."""
+    """Return ln x of a positive normal scalar: x = 2^k m, ln m = 2 artanh((m - 1) / (m + 1)) by its series."""
     shifted = bits_of(x) - np.int64(ROOT_BITS)
     k = shifted >> np.int64(MANTISSA)
     m = float_of(bits_of(x) - (k << np.int64(MANTISSA)))
@@ -66,7 +66,7 @@ def log(x):
 
 @njit(**LANE_OPTIONS)
 def exp(x):
-    """Return e^x between -``LARGEST_EXPONENT`` and it: x = k ln 2 + r, the series of e^r to r^12."""
+    """Return e^x of a scalar, clipped to +-``LARGEST_EXPONENT``: x = k ln 2 + r, series of e^r to r^12."""
     x = min(max(x, -LARGEST_EXPONENT), LARGEST_EXPONENT)
     k = math.floor(x / LN2 + 0.5)
     r = x - k * LN2
@@ -87,7 +87,7 @@ def exp(x):
 
 @njit(**LANE_OPTIONS)
 def rough_log(x):
-    """Return ln x to 4e-5."""
+    """Return ln x of a positive scalar with an absolute error of at most 4e-5."""
     k = (bits_of(x) - np.int64(ROOT_BITS)) >> np.int64(MANTISSA)
     m = float_of(bits_of(x) - (k << np.int64(MANTISSA)))
     s = (m - 1.0) / (m + 1.0)
@@ -96,7 +96,7 @@ def rough_log(x):
 
 @njit(**LANE_OPTIONS)
 def rough_exp(x):
-    """Return e^x to a share of 1e-3."""
+    """Return e^x of a scalar with a relative error of at most 1e-3; x is clipped to +-``LARGEST_EXPONENT``."""
     x = min(max(x, -LARGEST_EXPONENT), LARGEST_EXPONENT)
     k = math.floor(x / LN2 + 0.5)
     r = x - k * LN2
@@ -106,21 +106,24 @@ def rough_exp(x):
 
 @njit(**LANE_OPTIONS)
 def start_flow(w, state, g, law, reference):
-    """Write y = ln(x / reference) of increments x to start from, and of those at the static yield stress.
+    """Write start values of Newton's method for the plastic strain increments x of sixteen elements at one point.
 
-    Without hardening within the step 3 G x + Y C y = q - Y. With y_r = (q - Y) / (C Y), where only the rate limits x,
-    and y_c, where only the stiffness does, y = y_r - W(y_r exp(y_r - y_c)); W is Lambert's function to 1 %
-    (Iacono & Boyd, Adv. Comput. Math. 43, 2017).
+    Without hardening within the step 3 G x + Y C y = q - Y, y = ln(x / reference). With y_r = (q - Y) / (C Y), where
+    only the rate limits x, and y_c, where only the stiffness does, y = y_r - W(y_r exp(y_r - y_c)); W is Lambert's
+    function to 1 % (Iacono & Boyd, Adv. Comput. Math. 43, 2017).
 
     Args:
-        w: Workspace, with ``MISES``.
-        state: ``(m, .)`` of the points.
-        g: Which point.
-        law: Row of ``plastic_constants``, with sensitivity 0 where the rate does not count.
-        reference: Increment of the plastic strain at the reference rate, or any.
+        w: Flat workspace of ``kernels.nonlinear``. Reads the trial von Mises stress q [Pa] at ``MISES``; writes x at
+            ``FLOW``, y at ``LOGARITHM``, its upper bound at ``CEILING``, the hardening before the step [Pa] at
+            ``BEFORE`` and the reciprocal of the plastic strain at ``INVERSE``.
+        state: State of all points, shape (points, >= 112); reads the plastic strain at ``PLASTIC``.
+        g: Number of the point, row of ``state``.
+        law: 3 G [Pa], first yield stress [Pa], hardening modulus [Pa], exponent and rate sensitivity C, which is 0
+            where the rate does not count; scalars.
+        reference: Increment of the plastic strain at the reference rate, positive; 1 if the rate does not count.
 
     Returns:
-        In how many lanes something flows.
+        Number of the sixteen elements that yield, as a float.
     """
     stiffness, first, hardening, exponent, sensitivity = law
     divisor, inverse = sensitivity if sensitivity > 0.0 else 1.0, 1.0 / (stiffness * reference)
@@ -143,7 +146,11 @@ def start_flow(w, state, g, law, reference):
 
 @njit(**LANE_OPTIONS)
 def growing(w):
-    """Return in how many lanes the plastic strain grows by too much for ``small_power``."""
+    """Return the number of the sixteen elements, as a float, whose plastic strain grows too much for ``small_power``.
+
+    Args:
+        w: Workspace of ``start_flow``; reads the slots ``FLOW`` and ``INVERSE``.
+    """
     count = 0.0
     for lane in range(LANES):
         count += 1.0 if w[FLOW + lane] * w[INVERSE + lane] > SMALL_GROWTH else 0.0
@@ -152,7 +159,18 @@ def growing(w):
 
 @njit(**LANE_OPTIONS)
 def improve_flow(w, state, g, law, reference):
-    """Take a Newton step in y; return in how many lanes it has not converged. Arguments as above."""
+    """Take a Newton step in y = ln(x / reference) for the plastic strain increments x of sixteen elements at one point.
+
+    Args:
+        w: Workspace of ``start_flow``; x at ``FLOW`` and y at ``LOGARITHM`` are improved.
+        state: As in ``start_flow``.
+        g: As in ``start_flow``.
+        law: As in ``start_flow``.
+        reference: As in ``start_flow``.
+
+    Returns:
+        Number of elements that have not converged, as a float.
+    """
     stiffness, first, hardening, exponent, sensitivity = law
     count, is_small = 0.0, growing(w) == 0.0
     for lane in range(LANES):
@@ -176,7 +194,15 @@ def improve_flow(w, state, g, law, reference):
 
 @njit(**LANE_OPTIONS)
 def finish_flow(w, state, g, stiffness):
-    """Return the stress to the yield surface by the increments found; write plastic work densities there."""
+    """Return the stresses of sixteen elements at one point to the yield surface by the converged increments.
+
+    Args:
+        w: Workspace of ``start_flow``: the plastic strain increments at ``FLOW`` become plastic work densities [J/m^3],
+            the trial von Mises stress at ``MISES`` the stress after the step [Pa].
+        state: State of all points, shape (points, >= 112); stress and plastic strain of the point are updated.
+        g: Number of the point, row of ``state``.
+        stiffness: 3 G [Pa].
+    """
     for lane in range(LANES):
         s, d, flow, trial = six_of(state, g, lane), six(w, INCREMENT + lane), w[FLOW + lane], w[MISES + lane]
         p = (s[0] + s[1] + s[2]) / 3.0
@@ -205,25 +231,35 @@ def finish_flow(w, state, g, stiffness):
 
 @njit(**LANE_OPTIONS)
 def law_of(plastic, material, step):
-    """Return the row of ``materials.plasticity.plastic_constants`` of a material, and the step dt [s]."""
+    """Return the plastic law of a material as seven scalars.
+
+    Args:
+        plastic: Plastic constants of the materials, shape (nm, 6), see ``materials.plasticity.plastic_constants``.
+        material: Index of the material.
+        step: Time step dt [s].
+
+    Returns:
+        3 G [Pa], first yield stress [Pa], hardening modulus [Pa], exponent, rate sensitivity, reference rate [1/s], dt
+        [s].
+    """
     k = plastic[material]
     return k[0], k[1], k[2], k[3], k[4], k[5], step
 
 
 @njit(cache=True, error_model="numpy")
 def plastic_flow(w, state, g, law):
-    """Return the stress to the yield surface where the elastic trial state lies outside (radial return).
-
-    Its von Mises stress is then that after the step.
+    """Return the stress of sixteen elements at one point to the yield surface where the trial state lies outside.
 
     Args:
-        w: Workspace of ``kernels.nonlinear``.
-        state: ``(m, .)`` of the points, with the elastic trial stress.
-        g: Which point.
-        law: See ``law_of``; its first entry is 3 G.
+        w: Flat workspace of ``kernels.nonlinear`` with the strain increment at ``INCREMENT`` and the trial von Mises
+            stress at ``MISES`` [Pa], which becomes the stress after the step.
+        state: State of all points, shape (points, >= 112), with the elastic trial stress [Pa]; stress and plastic
+            strain of the point are updated (radial return).
+        g: Number of the point, row of ``state``.
+        law: Seven scalars of ``law_of``.
 
     Returns:
-        Whether any lane flows; then ``add_work`` can follow.
+        Whether any of the elements yields; then ``add_work`` can follow.
     """
     if count_above(w, MISES, law[FIRST_YIELD]) == 0.0:
         return False
@@ -242,16 +278,16 @@ def plastic_flow(w, state, g, law):
 
 @njit(**LANE_OPTIONS)
 def add_work(w, weight, g, work):
-    """Add the plastic work of a point that flows.
+    """Add the plastic work of sixteen elements at a point that yields.
 
-    It is the mean of the stress before and after the step times the plastic strain increment, as the elastic energy
-    s : C^-1 : s / 2 is integrated by the mean stress exactly: the sum of both is the work of the internal force.
+    It is the mean of the stress before and after the step times the plastic strain increment, as the elastic energy s :
+    C^-1 : s / 2 is integrated by the mean stress exactly: the sum of both is the work of the internal force.
 
     Args:
-        w: Workspace after ``plastic_flow``.
-        weight: ``(m, 16)`` [m^3] volumes of the points.
-        g: Which point.
-        work: ``(16,)`` [J].
+        w: Workspace after ``plastic_flow``, with plastic work densities [J/m^3].
+        weight: Volumes of the points, shape (points, 16) [m^3].
+        g: Number of the point, row of ``weight``.
+        work: Plastic work of each element, shape (16,) [J], added to.
     """
     for lane in range(LANES):
         work[lane] += weight[g, lane] * w[FLOW + lane]
@@ -259,7 +295,7 @@ def add_work(w, weight, g, work):
 
 @njit(**LANE_OPTIONS)
 def count_above(values, at, limit):
-    """Return in how many lanes an entry is above a limit."""
+    """Return how many of the sixteen scalars ``values[at]`` to ``values[at + 15]`` are above a limit, as a float."""
     count = 0.0
     for lane in range(LANES):
         count += 1.0 if values[at + lane] > limit else 0.0

@@ -59,7 +59,7 @@ GRADIENT, CORNERS, STIFFNESS = 9 * LANES, 30 * LANES, 42 * LANES
 
 @njit(**LANE_OPTIONS)
 def add_product(f, a, b):
-    """Return f + a (x) b."""
+    """Return f + a (x) b as nine scalars, row by row; f is a 3 x 3 matrix (nine scalars), a and b are vectors."""
     return (
         f[0] + a[0] * b[0], f[1] + a[0] * b[1], f[2] + a[0] * b[2],
         f[3] + a[1] * b[0], f[4] + a[1] * b[1], f[5] + a[1] * b[2],
@@ -69,7 +69,13 @@ def add_product(f, a, b):
 
 @njit(**LANE_OPTIONS)
 def write_mean_deformation(k, w, unit):
-    """Write F of sixteen elements; with ``unit`` zero in the place of one, F - 1."""
+    """Write the mean deformation gradient F of sixteen elements.
+
+    Args:
+        k: Constants of the elements, entry i of element e at ``16 * i + e``, shape (1920,), see the module.
+        w: Flat workspace of ``SLOTS`` entries; reads the transformed displacements [m], writes F at ``DEFORMATION``.
+        unit: 1.0, or 0.0 to write the displacement gradient F - 1 instead of F.
+    """
     b = k[GRADIENT - 3 * LANES :]
     for lane in range(LANES):
         f = add_product((unit, 0.0, 0.0, 0.0, unit, 0.0, 0.0, 0.0, unit), three(w, X + lane), three(b, X + lane))
@@ -83,7 +89,15 @@ def write_mean_deformation(k, w, unit):
 
 @njit(**LANE_OPTIONS)
 def amplitude(c, q, r, f, unit):
-    """Return g^ = R^T (q - (F - 1) c) of a mode; ``unit`` as above."""
+    """Return the hourglass amplitude g^ = R^T (q - (F - 1) c) of one mode in the rotated frame, three scalars [m].
+
+    Args:
+        c: Transform of the corners for the mode, three scalars [m].
+        q: Transformed displacement of the mode, three scalars [m].
+        r: Rotation R, nine scalars row by row.
+        f: F if ``unit`` is 1.0, F - 1 if it is 0.0; nine scalars.
+        unit: See ``f``.
+    """
     moved = applied(f, c)
     x, y, z = q[0] - moved[0] + unit * c[0], q[1] - moved[1] + unit * c[1], q[2] - moved[2] + unit * c[2]
     return applied(transposed(r), (x, y, z))
@@ -91,7 +105,13 @@ def amplitude(c, q, r, f, unit):
 
 @njit(**LANE_OPTIONS)
 def write_amplitudes(k, w, unit):
-    """Write g^ of sixteen elements, given F and R; ``unit`` as above."""
+    """Write the hourglass amplitudes g^ [m] of sixteen elements at the slots ``A`` to ``D`` of the workspace.
+
+    Args:
+        k: As in ``write_mean_deformation``.
+        unit: As in ``write_mean_deformation``.
+        w: Flat workspace of ``SLOTS`` entries with transformed displacements, F (or F - 1) and R.
+    """
     for lane in range(LANES):
         r, f = nine(w, ROTATION + lane), nine(w, DEFORMATION + lane)
         put_three(w, A + lane, amplitude(three(k, CORNERS + lane), three(w, XY + lane), r, f, unit))
@@ -102,14 +122,20 @@ def write_amplitudes(k, w, unit):
 
 @njit(**LANE_OPTIONS)
 def add_applied(v, m, a):
-    """Return v + m a."""
+    """Return v + m a as three scalars; m is a 3 x 3 matrix (nine scalars, row by row), v and a are vectors."""
     b = applied(m, a)
     return v[0] + b[0], v[1] + b[1], v[2] + b[2]
 
 
 @njit(**LANE_OPTIONS)
 def write_resistance(k, w):
-    """Write H g^ of sixteen elements from the symmetric blocks of the four modes; off-diagonal blocks act twice."""
+    """Write the hourglass forces H g^ [N] of sixteen elements, at the slots ``A + SHIFT`` to ``D + SHIFT``.
+
+    Args:
+        k: Constants of the elements, shape (1920,), with the stiffness H as symmetric blocks of the four modes;
+            off-diagonal blocks are stored once and act twice.
+        w: Flat workspace of ``SLOTS`` entries with the amplitudes g^ [m] at ``A`` to ``D``.
+    """
     for lane in range(LANES):
         a, b, c, d = three(w, A + lane), three(w, B + lane), three(w, C + lane), three(w, D + lane)
         at = STIFFNESS + lane
@@ -129,7 +155,12 @@ def write_resistance(k, w):
 
 @njit(**LANE_OPTIONS)
 def write_stress(k, w):
-    """Replace F of sixteen elements by P."""
+    """Replace F of sixteen elements by P [J], the force on F; see ``kernels.box_rotation``.
+
+    Args:
+        k: Constants of the elements, shape (1920,); reads V C [J].
+        w: Flat workspace of ``SLOTS`` entries with F, R, the amplitudes g^ [m] and the forces H g^ [N].
+    """
     for lane in range(LANES):
         r = nine(w, ROTATION + lane)
         u = stretch(r, nine(w, DEFORMATION + lane))
@@ -146,7 +177,12 @@ def write_stress(k, w):
 
 @njit(**LANE_OPTIONS)
 def replace_by_turned_forces(k, w):
-    """Replace the modes of sixteen elements by the forces on them, given P and H g^."""
+    """Replace the transformed displacements of sixteen elements by the forces on them [N].
+
+    Args:
+        k: Constants of the elements, shape (1920,).
+        w: Flat workspace of ``SLOTS`` entries with P [J] in the place of F, R, and the forces H g^ [N].
+    """
     b = k[GRADIENT - 3 * LANES :]
     for lane in range(LANES):
         r, d, c = nine(w, ROTATION + lane), nine(w, DEFORMATION + lane), CORNERS + lane
@@ -166,13 +202,23 @@ def replace_by_turned_forces(k, w):
 
 @njit(**LANE_OPTIONS)
 def less_product(f, a, b):
-    """Return f - a (x) b."""
+    """Return f - a (x) b as nine scalars, row by row; f is a 3 x 3 matrix (nine scalars), a and b are vectors."""
     return add_product(f, (-a[0], -a[1], -a[2]), b)
 
 
 @njit(cache=True)
 def read_block(cells, displacement, k, w):
-    """Write modes, F, R and g^ of a block; return whether no element is turned inside out."""
+    """Write transformed displacements, F, R, hourglass amplitudes g^ and forces H g^ of sixteen elements.
+
+    Args:
+        cells: Nodes of the elements, shape (8, 16).
+        displacement: Nodal displacement, shape (n, 3) [m].
+        k: Constants of the elements, shape (1920,).
+        w: Flat workspace of ``SLOTS`` entries, written.
+
+    Returns:
+        Whether no element is turned inside out; if one is, the results are meaningless.
+    """
     gather_lanes(cells, displacement, w)
     transform_corners(w)
     write_mean_deformation(k, w, 1.0)
@@ -184,17 +230,19 @@ def read_block(cells, displacement, k, w):
 
 @njit(cache=True)
 def add_turned_forces(cells, filled, constants, displacement, force):
-    """Subtract the internal force of hexahedra of any shapes.
+    """Subtract the internal force of corotational elastic hexahedra of any shapes.
 
     Args:
-        cells: ``(nb, 8, 16)`` int32 nodes in tensor order; lanes past the last element repeat it.
-        filled: ``(nb,)`` int32 elements of each block.
-        constants: ``(nb, 1920)`` of each lane the entries above.
-        displacement: ``(n, 3)`` [m].
-        force: ``(n, 3)`` [N], added to.
+        cells: Nodes of the elements in tensor order, in blocks of sixteen elements, shape (nb, 8, 16) int32; elements
+            after the last one repeat it.
+        filled: Number of elements of each block, shape (nb,) int32.
+        constants: 120 constants of each element (V C [J], b_p [1/m], c_k [m], H [N/m]), entry i of element e at ``16 *
+            i + e``, shape (nb, 1920).
+        displacement: Nodal displacement, shape (n, 3) [m].
+        force: Nodal force, shape (n, 3) [N], subtracted from.
 
     Returns:
-        ``UPRIGHT``, or the first block with an element that is turned inside out; then the force is not complete.
+        ``UPRIGHT`` (-1), or the first block with an element that is turned inside out; then the force is not complete.
     """
     w = np.empty(SLOTS)
     for b in range(len(cells)):
@@ -209,7 +257,14 @@ def add_turned_forces(cells, filled, constants, displacement, force):
 
 @njit(cache=True)
 def turned_energies(cells, filled, constants, displacement):
-    """Return the energies [J] of the mean strains and of the hourglass modes; arguments as above."""
+    """Return the total energies of mean strains and of hourglass modes, two scalars [J].
+
+    Args:
+        cells: As in ``add_turned_forces``.
+        filled: As in ``add_turned_forces``.
+        constants: As in ``add_turned_forces``.
+        displacement: As in ``add_turned_forces``.
+    """
     w = np.zeros(SLOTS)
     mean = higher = 0.0
     for b in range(len(cells)):

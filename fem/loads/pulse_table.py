@@ -184,7 +184,7 @@ def find_column(path: Path, number: int, row: Sequence[str], column: str | None)
 
 
 def _listed(titles: Sequence[str]) -> str:
-    return abbreviated(", ".join(titles))
+    return abbreviate(", ".join(titles))
 
 
 def split_title(title: str) -> tuple[str, str]:
@@ -200,7 +200,7 @@ def read_unit(path: Path, number: int, title: str, units: dict[str, float]) -> f
         near = get_close_matches(unit, units, n=1, cutoff=0.3)
         hint = f"; did you mean [{near[0]}]?" if near else ""
         raise PulseError(
-            f"{path}, line {number}: column {abbreviated(title)!r} needs its unit in brackets, "
+            f"{path}, line {number}: column {abbreviate(title)!r} needs its unit in brackets, "
             f"one of {', '.join(units)}{hint}"
         )
     return units[unit]
@@ -214,10 +214,10 @@ def read_row(path: Path, number: int, row: Sequence[str], columns: Columns) -> t
         time, value = (float(row[k]) * scale for k, scale in zip((0, columns.value), columns.scales, strict=True))
     except ValueError:
         count = "two" if columns.count == 2 else columns.count
-        cells = abbreviated(", ".join(row))
+        cells = abbreviate(", ".join(row))
         raise PulseError(f"{path}, line {number}: {count} numbers are needed, found {cells}") from None
     if not (math.isfinite(time) and math.isfinite(value)):
-        raise PulseError(f"{path}, line {number}: {abbreviated(', '.join(row))} is not finite")
+        raise PulseError(f"{path}, line {number}: {abbreviate(', '.join(row))} is not finite")
     return time, value
 
 
@@ -229,6 +229,6 @@ def check_times(path: Path, lines: Sequence[int], times: np.ndarray) -> None:
         raise PulseError(f"{path}, line {lines[k + 1]}: times must increase, {times[k + 1]:g} s follows {times[k]:g} s")
 
 
-def abbreviated(text: str) -> str:
+def abbreviate(text: str) -> str:
     """Return a text cut to ``LONGEST`` characters with an ellipsis."""
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"

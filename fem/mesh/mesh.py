@@ -47,30 +47,30 @@ class MeshData:
         return np.array([accept(name) for name in self.part_names], dtype=bool)[self.part]
 
 
-def append(pieces: Sequence[MeshData]) -> MeshData:
+def append(meshes: Sequence[MeshData]) -> MeshData:
     """Concatenate meshes without merging nodes; parts and facet sets of equal name are joined.
 
     Raises:
         MeshError: The meshes have cells of different shapes.
     """
-    shapes = {piece.shape.name for piece in pieces}
+    shapes = {mesh.shape.name for mesh in meshes}
     if len(shapes) > 1:
         raise MeshError(f"all meshes of a model need cells of one shape, found {', '.join(sorted(shapes))}")
-    names = tuple(dict.fromkeys(name for piece in pieces for name in piece.part_names))
-    offsets = np.concatenate([[0], np.cumsum([len(piece.points) for piece in pieces])]).astype(np.int32)
-    number = [np.array([names.index(name) for name in piece.part_names], np.int32) for piece in pieces]
-    facet_names = dict.fromkeys(name for piece in pieces for name in piece.facets)
+    names = tuple(dict.fromkeys(name for mesh in meshes for name in mesh.part_names))
+    offsets = np.concatenate([[0], np.cumsum([len(mesh.points) for mesh in meshes])]).astype(np.int32)
+    number = [np.array([names.index(name) for name in mesh.part_names], np.int32) for mesh in meshes]
+    facet_names = dict.fromkeys(name for mesh in meshes for name in mesh.facets)
     return MeshData(
-        points=np.concatenate([piece.points for piece in pieces]),
-        cells=np.concatenate([piece.cells + offset for piece, offset in zip(pieces, offsets[:-1], strict=True)]),
-        part=np.concatenate([numbers[piece.part] for numbers, piece in zip(number, pieces, strict=True)]),
+        points=np.concatenate([mesh.points for mesh in meshes]),
+        cells=np.concatenate([mesh.cells + offset for mesh, offset in zip(meshes, offsets[:-1], strict=True)]),
+        part=np.concatenate([numbers[mesh.part] for numbers, mesh in zip(number, meshes, strict=True)]),
         part_names=names,
         facets={
             name: np.concatenate(
                 [
-                    piece.facets[name] + offset
-                    for piece, offset in zip(pieces, offsets[:-1], strict=True)
-                    if name in piece.facets
+                    mesh.facets[name] + offset
+                    for mesh, offset in zip(meshes, offsets[:-1], strict=True)
+                    if name in mesh.facets
                 ]
             )
             for name in facet_names
@@ -112,7 +112,7 @@ def selected_cells(data: MeshData, chosen: NDArray[np.bool_]) -> tuple[MeshData,
 def merge_nodes(
     data: MeshData, duplicates: NDArray[np.int32], originals: NDArray[np.int32]
 ) -> tuple[MeshData, NDArray[np.int32]]:
-    """Replace each node of ``duplicates`` by that of ``originals``; returns as in ``without_unused_nodes``."""
+    """Replace each of ``duplicates`` by the same row of ``originals``; returns as in ``without_unused_nodes``."""
     number = np.arange(len(data.points), dtype=np.int32)
     number[duplicates] = originals
     facets = {name: number[quads] for name, quads in data.facets.items()}

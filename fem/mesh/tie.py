@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from reflowshock.fem.cell_shape import HEXAHEDRON
 from reflowshock.fem.errors import TieError
@@ -132,6 +131,8 @@ def closest_facets(
     Returns:
         Facet of each point (m,), reference coordinates of its closest point (m, 2), and distance (m,) [m].
     """
+    from scipy.spatial import cKDTree  # imported late to keep the start-up of plans fast
+
     count = min(CANDIDATES, len(corners))
     _, near = cKDTree(corners.mean(axis=1)).query(points, k=count)
     near = near.reshape(len(points), count)

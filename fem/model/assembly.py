@@ -29,7 +29,7 @@ MASS_TOLERANCE = 1e-10
 
 
 @dataclass(frozen=True, slots=True)
-class Pieces:
+class RankElements:
     """Elements of one rank with their materials and critical steps, before mass scaling.
 
     Attributes:
@@ -52,7 +52,7 @@ class Pieces:
     materials: tuple[Material, ...]
     laws: Mapping[int, Law] = field(default_factory=dict)
 
-    def with_laws(self, part_names: Sequence[str], laws: Mapping[str, Law]) -> "Pieces":
+    def with_laws(self, part_names: Sequence[str], laws: Mapping[str, Law]) -> "RankElements":
         """Replace the materials of some parts by UFL laws; the densities remain.
 
         Args:
@@ -89,12 +89,12 @@ class ForceOptions:
     stiffness: float = 0.0
 
 
-def make_pieces(
+def make_rank_elements(
     local: LocalMesh,
     tables: Tables,
     materials: Materials | Mapping[str, Material],
     formulation: str = HEXAHEDRON.name,
-) -> Pieces:
+) -> RankElements:
     """Assign materials to the local elements and compute their critical steps.
 
     Args:
@@ -116,7 +116,7 @@ def make_pieces(
     geometry = element_geometry(elements.points, elements.cells)
     steps = critical_steps(elements, geometry.nodal_volume)
     roles = np.array(names)[number]
-    return Pieces(local, elements, geometry, steps, roles, number, assigned)
+    return RankElements(local, elements, geometry, steps, roles, number, assigned)
 
 
 def sorted_by_pace(local: LocalMesh, tables: Tables) -> LocalMesh:
@@ -144,7 +144,7 @@ def local_tie(local: LocalMesh, tie: Tie) -> Tie:
 
 def make_body(
     comm: MPI.Comm,
-    pieces: Pieces,
+    rank_elements: RankElements,
     tables: Tables,
     mass_factor: NDArray[np.float64],
     response: ForceOptions | None = ForceOptions(),
@@ -153,53 +153,53 @@ def make_body(
 
     Args:
         comm: Communicator of the model.
-        pieces: Elements of the rank.
+        rank_elements: Elements of the rank.
         tables: Tables of the model.
         mass_factor: Factor on the density of each element, shape (ne,).
-        response: Kinematics and step; None for linear elastic terms whatever the materials.
+        response: Kinematics and step; None for linear elastic terms, also for plastic materials.
     """
-    local = pieces.local
-    plain = pieces.elements
+    local = rank_elements.local
+    plain = rank_elements.elements
     elements = replace(plain, density=plain.density * mass_factor)
     shared = SharedNodes(comm, local.nodes)
     tie = local_tie(local, tables.tie)
-    mass = assembled_mass(elements, pieces.geometry, tie, shared)
-    check_mass(comm, float(mass[shared.owned].sum()), float(elements.density @ pieces.geometry.volume))
+    mass = assembled_mass(elements, rank_elements.geometry, tie, shared)
+    check_mass(comm, float(mass[shared.owned].sum()), float(elements.density @ rank_elements.geometry.volume))
     free = np.ones((len(local.nodes), 3), dtype=bool)
     held = local.locate(tables.held_nodes)
     free[held[held >= 0]] = ~tables.held[held >= 0]
     free[tie.slave] = False
     interface = local.locate(tables.interface).astype(np.int32)
-    body = Body(local, elements, pieces.geometry, [], tie, shared, interface, mass, free)
+    body = Body(local, elements, rank_elements.geometry, [], tie, shared, interface, mass, free)
     if response and tables.every.max() > 1:
-        body = with_paces(body, pieces, tables, response)
+        body = with_paces(body, rank_elements, tables, response)
     else:
-        terms = response_terms(comm, body, pieces, tables, response) if response else linear_terms(elements)
+        terms = response_terms(comm, body, rank_elements, tables, response) if response else linear_terms(elements)
         body = replace(body, terms=terms)
     warm_up(body.terms, len(mass))
     return body
 
 
-def with_paces(body: Body, pieces: Pieces, tables: Tables, response: ForceOptions) -> Body:
+def with_paces(body: Body, rank_elements: RankElements, tables: Tables, response: ForceOptions) -> Body:
     """Return a body with separate force terms for the elements of each pace.
 
     Raises:
         LevelError: An element has a UFL law; on every rank.
     """
-    if pieces.laws:
+    if rank_elements.laws:
         raise LevelError("a UFL law needs every time step; set coupling.levels = 1")
     element_paces, schedule = tables.every[body.local.cell_numbers], np.unique(tables.every).tolist()
     terms: list[ForceTerm] = []
     paces: list[int] = []
     for pace in schedule:
         step = pace * response.step
-        pace_terms = terms_of(body.elements, element_paces == pace, pieces.materials, response.kinematics, step)
+        pace_terms = terms_of(body.elements, element_paces == pace, rank_elements.materials, response.kinematics, step)
         terms, paces = [*terms, *pace_terms], [*paces, *[pace] * len(pace_terms)]
     return replace(body, terms=terms, paces=tuple(paces), schedule=tuple(schedule), element_paces=element_paces)
 
 
 def response_terms(
-    comm: MPI.Comm, body: Body, pieces: Pieces, tables: Tables, response: ForceOptions
+    comm: MPI.Comm, body: Body, rank_elements: RankElements, tables: Tables, response: ForceOptions
 ) -> list[ForceTerm]:
     """Return the force terms of a body, with one term for all elements that take local time steps; collective.
 
@@ -207,10 +207,12 @@ def response_terms(
         LevelError: A body with local time steps has an element that is not linear elastic; on every rank.
     """
     if not tables.level.any():
-        return force_terms(body.elements, pieces.materials, response.kinematics, response.step, pieces.laws)
-    if pieces.laws:
+        return force_terms(
+            body.elements, rank_elements.materials, response.kinematics, response.step, rank_elements.laws
+        )
+    if rank_elements.laws:
         raise LevelError("a UFL law does not support local time steps; choose a coupling.scheme other than local_steps")
-    check_elastic(pieces.materials, response.kinematics, tables.ratios)
+    check_elastic(rank_elements.materials, response.kinematics, tables.ratios)
     level = tables.level[body.local.cell_numbers]
     levels = SubsteppedElements.build(
         comm, body, Levels(level, tables.ratios, response.step, response.stiffness / response.step)

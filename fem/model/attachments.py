@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from reflowshock.fem.division.fitted import FittedTable
 from reflowshock.fem.forces.bedding import BeddedFacets
 from reflowshock.fem.mesh.facet import spring_rates
-from reflowshock.fem.model.assembly import Pieces
+from reflowshock.fem.model.assembly import RankElements
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.local_mesh import LocalMesh
 from reflowshock.fem.problem.fittings import Support
@@ -20,15 +20,15 @@ def beddings_of(local: LocalMesh, table: FittedTable, supports: Mapping[str, Sup
     return [BeddedFacets.build(name, local, facets, supports[name].stiffness) for name, facets in table.bedded.items()]
 
 
-def with_support_stiffness(pieces: Pieces, bedding: BeddedFacets) -> Pieces:
+def with_support_stiffness(rank_elements: RankElements, bedding: BeddedFacets) -> RankElements:
     """Return the elements with critical steps reduced by the stiffness of an elastic support."""
-    elements, cells = pieces.elements, bedding.cells
-    mass = elements.density[cells][:, None] * pieces.geometry.nodal_volume[cells]
-    corners = pieces.local.points[bedding.facets]
-    added_frequency = np.zeros(len(pieces.steps))  # squared circular frequency [1/s^2]
+    elements, cells = rank_elements.elements, bedding.cells
+    mass = elements.density[cells][:, None] * rank_elements.geometry.nodal_volume[cells]
+    corners = rank_elements.local.points[bedding.facets]
+    added_frequency = np.zeros(len(rank_elements.steps))  # squared circular frequency [1/s^2]
     rates = spring_rates(elements.cells[cells], bedding.facets, mass, corners, bedding.stiffness)
     np.add.at(added_frequency, cells, rates)
-    return replace(pieces, steps=2.0 / np.sqrt((2.0 / pieces.steps) ** 2 + added_frequency))
+    return replace(rank_elements, steps=2.0 / np.sqrt((2.0 / rank_elements.steps) ** 2 + added_frequency))
 
 
 def with_attachments(

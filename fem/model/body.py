@@ -25,14 +25,14 @@ class Body:
         elements: Elements with their density, mass scaling included.
         geometry: Volumes and mean gradients of the elements.
         terms: Force terms.
-        paces: Pace of each of the first terms, which act by impulses once in so many steps (``path_levels``); the other
+        paces: Number of steps in which each of the first terms acts once by an impulse (``path_levels``); the other
             terms act in every step.
         schedule: Paces of the model's terms on all ranks.
         element_paces: Pace of each element, shape (ne,); empty if all elements act in every step.
         tie: Slaves and masters in local numbers.
         shared: Nodes shared with other ranks.
         interface: Local number of each interface node, -1 on another rank, shape (nc,).
-        mass: Lumped mass, of slaves moved to their masters, shape (n,) [kg].
+        mass: Lumped mass, with the mass of slaves moved to their masters, shape (n,) [kg].
         free: Whether a displacement component follows from forces, shape (n, 3).
         initial_stress: Mean stress of linear elements at zero displacement, shape (ne, 6) [Pa], or None.
         lumped: Sum of the attached masses at the nodes that this rank owns [kg].

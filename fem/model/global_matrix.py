@@ -21,14 +21,14 @@ class Equations:
         comm: Communicator of the model.
         body: Model on this rank.
         number: Global equation of each component, -1 if it is fixed or a slave's, shape (n, 3) int32.
-        own: Whether this rank owns the equation, shape (n, 3).
+        owned: Whether this rank owns the equation, shape (n, 3).
         total: Number of equations on all ranks.
     """
 
     comm: MPI.Comm
     body: Body
     number: NDArray[np.int32]
-    own: NDArray[np.bool_]
+    owned: NDArray[np.bool_]
     total: int
 
     @classmethod
@@ -50,18 +50,18 @@ class Equations:
     @property
     def layout(self) -> tuple[int, int]:
         """Number of equations on this rank and on all ranks."""
-        return int(self.own.sum()), self.total
+        return int(self.owned.sum()), self.total
 
     def vector(self, values: NDArray[np.float64]) -> PETSc.Vec:
         """Return the PETSc vector of the free components of nodal values, shape (n, 3)."""
         vector = PETSc.Vec().createMPI(self.layout, comm=self.comm)
-        vector.array = values[self.own]
+        vector.array = values[self.owned]
         return vector
 
     def spread(self, vector: PETSc.Vec, values: NDArray[np.float64]) -> None:
         """Write a PETSc vector into nodal values, shape (n, 3), with slaves; fixed components become zero."""
         values.fill(0.0)
-        values[self.own] = vector.array
+        values[self.owned] = vector.array
         self.body.shared.add(values)
         self.body.tie.spread(values)
 
@@ -76,7 +76,7 @@ class Equations:
         row, column = number[local.row], number[local.col]
         is_free = (row >= 0) & (column >= 0)
         row, column, value = self.to_owners(row[is_free], column[is_free], local.data[is_free])
-        rows, first = self.layout[0], int(self.number[self.own].min(initial=self.total))
+        rows, first = self.layout[0], int(self.number[self.owned].min(initial=self.total))
         mine = scipy.sparse.csr_matrix((value, (row - first, column)), shape=(rows, self.total))
         matrix = PETSc.Mat().createAIJ(
             (self.layout, self.layout), csr=(mine.indptr, mine.indices, mine.data), comm=self.comm

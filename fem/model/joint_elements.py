@@ -26,7 +26,7 @@ class ElasticHexahedra:
         if body.begin is not None:
             body.begin(self._term)
         self._start = {name: values.copy() for name, values in self._term.history.items()}
-        self._place = self._term.located(np.arange(len(chosen)))
+        self._locations = self._term.located(np.arange(len(chosen)))
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
         """Subtract the internal force, shape (n, 3) [N], at a displacement, shape (n, 3) [m]."""
@@ -36,10 +36,10 @@ class ElasticHexahedra:
 
     def points(self) -> PointValues:
         """Return the values at the integration points at the latest displacement."""
-        return self._term.points(*self._place)
+        return self._term.points(*self._locations)
 
 
-class TurningElements:
+class SampledCorotational:
     """Corotational hexahedra: force by their own law, point values by the finite-strain element."""
 
     def __init__(self, body: Body, term: Corotational, chosen: NDArray[np.integer]) -> None:
@@ -59,21 +59,21 @@ class TurningElements:
         return self._points.points()
 
 
-class FollowingElements:
+class SampledNonlinear:
     """Path-dependent elements: point values of the body's term, forces of a copy with the selected elements."""
 
     def __init__(self, term: NonlinearElements, places: NDArray[np.integer]) -> None:
         """Select elements of a term by their positions in it, shape (k,)."""
-        self._term, self._place, self._frozen = term, term.located(places), term.frozen(places)
+        self._term, self._locations, self._frozen = term, term.located(places), term.frozen(places)
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
         """Subtract the internal force, shape (n, 3) [N], at ``displacement``, the latest displacement of the term."""
-        self._frozen.take_path(self._term, *self._place)
+        self._frozen.take_path(self._term, *self._locations)
         self._frozen.add(displacement, force)
 
     def points(self) -> PointValues:
         """Return the current values at the integration points."""
-        return self._term.points(*self._place)
+        return self._term.points(*self._locations)
 
 
 class JointElements:
@@ -94,7 +94,7 @@ class JointElements:
         self._body, self._size = body, len(chosen)
         self._levels = levels_of(body.terms)
         is_linear = np.ones(len(chosen), dtype=bool)
-        self._nonlinear: list[tuple[NDArray[np.intp], FollowingElements | TurningElements]] = []
+        self._nonlinear: list[tuple[NDArray[np.intp], SampledNonlinear | SampledCorotational]] = []
         for term in body.terms:
             if not isinstance(term, NonlinearElements | Corotational):
                 continue
@@ -102,9 +102,9 @@ class JointElements:
             rows = np.flatnonzero(index >= 0)
             is_linear[rows] = False
             if len(rows) and isinstance(term, NonlinearElements):
-                self._nonlinear.append((rows, FollowingElements(term, index[rows])))
+                self._nonlinear.append((rows, SampledNonlinear(term, index[rows])))
             elif len(rows) and isinstance(term, Corotational):
-                self._nonlinear.append((rows, TurningElements(body, term, chosen[rows])))
+                self._nonlinear.append((rows, SampledCorotational(body, term, chosen[rows])))
         self._linear = [
             (k, rows, ElasticHexahedra(body, chosen[rows]))
             for k in np.unique(level[chosen])

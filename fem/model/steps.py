@@ -21,7 +21,7 @@ from reflowshock.fem.errors import StepError
 from reflowshock.fem.estimates.estimate import WindowPlan, damped_critical_step
 from reflowshock.fem.estimates.solver_cost import implicit_step
 from reflowshock.fem.forces.bedding import BeddedFacets
-from reflowshock.fem.model.assembly import Pieces, make_body
+from reflowshock.fem.model.assembly import RankElements, make_body
 from reflowshock.fem.model.power_iteration import highest_frequency
 from reflowshock.fem.parallel.communicators import Role
 from reflowshock.fem.problem.structure import Dynamics
@@ -83,7 +83,7 @@ def steps_of_division(whole: Whole, survey: Survey, division: Division, rules: R
     )
 
 
-def undivided(steps: Steps, critical: float, rules: Rules) -> Steps:
+def single_model_steps(steps: Steps, critical: float, rules: Rules) -> Steps:
     """Return the steps of an undivided model with the same windows and its own critical step [s]."""
     smallest = damped_critical_step(critical, rules.stiffness)
     substeps = math.ceil(steps.plan.window / (rules.fraction * smallest))
@@ -92,7 +92,7 @@ def undivided(steps: Steps, critical: float, rules: Rules) -> Steps:
 
 def assembled_step(
     comm: MPI.Comm,
-    pieces: Pieces,
+    rank_elements: RankElements,
     tables: Tables,
     mass_factor: NDArray[np.float64],
     beddings: Sequence[BeddedFacets] = (),
@@ -105,45 +105,45 @@ def assembled_step(
 
     Args:
         comm: Communicator of the model.
-        pieces: Elements of the rank.
+        rank_elements: Elements of the rank.
         tables: Tables of the model.
         mass_factor: Factor on the density of each element, shape (ne,).
         beddings: Elastic supports on this rank.
     """
-    body = make_body(comm, pieces, tables, mass_factor, None)
+    body = make_body(comm, rank_elements, tables, mass_factor, None)
     highest = highest_frequency(comm, body, [*body.terms, *beddings], body.mass)
     body.shared.free()
     return highest.critical_step
 
 
-def agreed_minimum(world: MPI.Comm, values: Sequence[NDArray[np.float64]]) -> float:
+def find_minimum(world: MPI.Comm, values: Sequence[NDArray[np.float64]]) -> float:
     """Return the smallest of all values on all ranks, infinity if there are none; collective."""
     return float(world.allreduce(min(float(array.min(initial=np.inf)) for array in values), MPI.MIN))
 
 
-def mass_factor(pieces: Pieces, scaled: Sequence[str], target: float) -> NDArray[np.float64]:
+def mass_factor(rank_elements: RankElements, scaled: Sequence[str], target: float) -> NDArray[np.float64]:
     """Return the density factor, shape (ne,), that raises the critical steps of the scaled roles to ``target`` [s]."""
-    return np.where(np.isin(pieces.roles, scaled), np.maximum(1.0, (target / pieces.steps) ** 2), 1.0)
+    return np.where(np.isin(rank_elements.roles, scaled), np.maximum(1.0, (target / rank_elements.steps) ** 2), 1.0)
 
 
 def critical_by_role(
-    world: MPI.Comm, models: Sequence[Pieces], roles: Iterable[str] = tuple(Materials.model_fields)
+    world: MPI.Comm, models: Sequence[RankElements], roles: Iterable[str] = tuple(Materials.model_fields)
 ) -> dict[str, float]:
     """Return the smallest element critical step [s] of each material role over all ranks; collective."""
-    smallest = {role: agreed_minimum(world, [model.steps[model.roles == role] for model in models]) for role in roles}
+    smallest = {role: find_minimum(world, [model.steps[model.roles == role] for model in models]) for role in roles}
     return {role: step for role, step in smallest.items() if np.isfinite(step)}
 
 
-def explicit_steps(comm: MPI.Comm, pieces: Pieces, dynamics: Dynamics) -> Steps:
+def explicit_steps(comm: MPI.Comm, rank_elements: RankElements, dynamics: Dynamics) -> Steps:
     """Choose the steps of central differences from the critical steps of the elements; collective.
 
     Mass scaling raises them, stiffness-proportional damping lowers them.
     """
     scaled = dynamics.numerics.mass_scaled
-    target = agreed_minimum(comm, [pieces.steps[~np.isin(pieces.roles, scaled)]])
-    factor = mass_factor(pieces, scaled, target)
-    critical = agreed_minimum(comm, [pieces.steps * np.sqrt(factor)])
-    return make_steps(comm, pieces, factor, *explicit_plan(dynamics, critical))
+    target = find_minimum(comm, [rank_elements.steps[~np.isin(rank_elements.roles, scaled)]])
+    factor = mass_factor(rank_elements, scaled, target)
+    critical = find_minimum(comm, [rank_elements.steps * np.sqrt(factor)])
+    return make_steps(comm, rank_elements, factor, *explicit_plan(dynamics, critical))
 
 
 def explicit_plan(dynamics: Dynamics, undamped: float) -> tuple[WindowPlan, float]:
@@ -174,10 +174,10 @@ def with_critical(steps: Steps, undamped: float, dynamics: Dynamics) -> Steps:
     return replace(steps, plan=plan, macro_critical=critical, smallest=critical)
 
 
-def implicit_steps(comm: MPI.Comm, pieces: Pieces, dynamics: Dynamics, pulses: Iterable[float]) -> Steps:
+def implicit_steps(comm: MPI.Comm, rank_elements: RankElements, dynamics: Dynamics, pulses: Iterable[float]) -> Steps:
     """Choose the steps of the implicit solver, from the input or the shortest pulse duration [s]; collective."""
-    critical, plan = agreed_minimum(comm, [pieces.steps]), window_plan(dynamics, implicit_step(dynamics, pulses))
-    return make_steps(comm, pieces, np.ones(len(pieces.steps)), plan, critical)
+    critical, plan = find_minimum(comm, [rank_elements.steps]), window_plan(dynamics, implicit_step(dynamics, pulses))
+    return make_steps(comm, rank_elements, np.ones(len(rank_elements.steps)), plan, critical)
 
 
 def window_plan(dynamics: Dynamics, largest: float) -> WindowPlan:
@@ -185,34 +185,36 @@ def window_plan(dynamics: Dynamics, largest: float) -> WindowPlan:
 
     Different solvers then sample a problem at the same times, unless a run has fewer steps than samples.
     """
-    samples = min(dynamics.numerics.history_samples, at_least(dynamics.duration / largest))
-    stride = at_least(dynamics.duration / samples / largest / LONGEST_WINDOW)
+    samples = min(dynamics.numerics.history_samples, round_up(dynamics.duration / largest))
+    stride = round_up(dynamics.duration / samples / largest / LONGEST_WINDOW)
     windows = samples * stride
-    return WindowPlan(dynamics.duration / windows, at_least(dynamics.duration / windows / largest), windows, stride)
+    return WindowPlan(dynamics.duration / windows, round_up(dynamics.duration / windows / largest), windows, stride)
 
 
-def at_least(count: float) -> int:
+def round_up(count: float) -> int:
     """Return ``count`` rounded up to an integer of at least 1, tolerant of round-off in the ratio."""
     return max(1, math.ceil(count * (1.0 - ROUNDING)))
 
 
 def make_steps(
-    comm: MPI.Comm, pieces: Pieces, factor: NDArray[np.float64], plan: WindowPlan, critical: float
+    comm: MPI.Comm, rank_elements: RankElements, factor: NDArray[np.float64], plan: WindowPlan, critical: float
 ) -> Steps:
     """Return the steps of a single model with its masses; collective.
 
     Args:
         comm: Communicator of the model.
-        pieces: Elements of the rank.
+        rank_elements: Elements of the rank.
         factor: Factor on the density of each element, shape (ne,).
         plan: Windows and substeps.
         critical: Critical step of explicit integration [s].
     """
-    mass = pieces.elements.density * pieces.geometry.volume
+    mass = rank_elements.elements.density * rank_elements.geometry.volume
     return Steps(
         plan=plan,
         mass_factors=[factor],
-        critical=critical_by_role(comm, [pieces], sorted(set(comm.allreduce(sorted(set(pieces.roles.tolist())))))),
+        critical=critical_by_role(
+            comm, [rank_elements], sorted(set(comm.allreduce(sorted(set(rank_elements.roles.tolist())))))
+        ),
         macro_critical=critical,
         smallest=critical,
         added_mass=comm.allreduce(float(mass @ (factor - 1.0))),

@@ -54,7 +54,7 @@ class Acceleration:
         }
 
 
-def low_passed(values: NDArray[np.float64], step: float, low_pass: LowPass) -> NDArray[np.float64]:
+def apply_low_pass(values: NDArray[np.float64], step: float, low_pass: LowPass) -> NDArray[np.float64]:
     """Return samples, shape (n,), at equal steps [s], filtered forwards and backwards.
 
     The record is extended at both ends by its mirror image at the end point, over two periods of the corner frequency.
@@ -81,7 +81,7 @@ def acceleration(time: NDArray[np.float64], displacement: NDArray[np.float64], l
     """Return the acceleration from absolute displacements, shape (n,) [m], at equally spaced times, shape (n,) [s]."""
     step = float(time[-1] - time[0]) / (len(time) - 1)
     raw = np.diff(displacement, n=2) / step**2
-    return Acceleration(time[1:-1], raw, low_passed(raw, step, low_pass))
+    return Acceleration(time[1:-1], raw, apply_low_pass(raw, step, low_pass))
 
 
 def peaks_of(accelerations: Mapping[str, Acceleration], low_pass: LowPass) -> dict[str, dict[str, Any]]:

@@ -16,7 +16,7 @@ from reflowshock.fem.elements.stress import von_mises
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.stress_recovery import StressRecovery
-from reflowshock.fem.output.result import checked, quantity
+from reflowshock.fem.output.result import make_checks, quantity
 from reflowshock.fem.output.watch_joints import STRESSES, JointWatch
 from reflowshock.fem.problem.inputs import CoolingInput
 from reflowshock.fem.setup.models import Model
@@ -84,7 +84,7 @@ def write_cooling(
     write_fields(whole.mesh, cooling, fields, request)
     record = {
         "metrics": metrics(whole.mesh, cooling, joints, convergence),
-        "health": checked(
+        "health": make_checks(
             {
                 "cooling_force_residual": (convergence.residuals[-1], CONVERGED),
                 "cooling_unbalanced_force": (convergence.shock_residual, UNBALANCED_LIMIT),

@@ -100,7 +100,7 @@ class JointSections:
         corners = points[self._facets]
         normal, first, area = facet_sums(corners)
         values = np.column_stack([first, self._facet_sign[:, None] * normal, area])
-        shape = summed(self._facet_slot, values, len(self._faces.centre))
+        shape = sum_by_slot(self._facet_slot, values, len(self._faces.centre))
         return np.concatenate([sections, shape, inertia, self._supported[:, None]], axis=None)
 
 
@@ -109,10 +109,10 @@ def loads(
 ) -> NDArray[np.float64]:
     """Return force and moment about a point of each slot, shape (slots, 6), of nodal forces, shape (k, 3) [N]."""
     arm = points[mass.nodes] - about[mass.slot]
-    return summed(mass.slot, np.column_stack([force, np.cross(arm, force)]), len(about))
+    return sum_by_slot(mass.slot, np.column_stack([force, np.cross(arm, force)]), len(about))
 
 
-def summed(slot: NDArray[np.int64], values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+def sum_by_slot(slot: NDArray[np.int64], values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """Return the sums by slot, shape (count, c), of rows of values, shape (k, c)."""
     return np.stack([np.bincount(slot, column, count) for column in values.T], axis=1)
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.elements.stress import principal_strains, von_mises
 from reflowshock.fem.mesh.point_table import PointTable
-from reflowshock.fem.output.acceleration import is_sampled, low_passed
+from reflowshock.fem.output.acceleration import apply_low_pass, is_sampled
 from reflowshock.fem.output.result import quantity
 from reflowshock.fem.output.structure_modes import ModeTable
 from reflowshock.fem.problem.filters import LowPass
@@ -41,7 +41,7 @@ def gauge_lengths(table: PointTable) -> dict[str, float]:
 def strain_rate(time: NDArray[np.float64], strain: NDArray[np.float64], low_pass: LowPass) -> NDArray[np.float64]:
     """Return the rate of a filtered strain, shape (n,) [1/s], at equally spaced times, shape (n,) [s]."""
     step = float(time[-1] - time[0]) / (len(time) - 1)
-    return np.gradient(low_passed(strain, step, low_pass), step)
+    return np.gradient(apply_low_pass(strain, step, low_pass), step)
 
 
 def gauge_metrics(arrays: Mapping[str, NDArray], low_pass: LowPass) -> dict[str, Any]:

@@ -54,11 +54,11 @@ def ranking_measure(arrays: Arrays) -> Measure:
     return PLASTIC_WORK if yielded else PEEL
 
 
-def ranked(arrays: Arrays) -> NDArray[np.intp]:
+def rank_joints(arrays: Arrays) -> NDArray[np.intp]:
     """Return the joint numbers, critical joint first and ties by peel stress, shape (joints,)."""
     return np.lexsort((-PEEL.peaks(arrays), -ranking_measure(arrays).peaks(arrays)))
 
 
 def critical_joint(arrays: Arrays) -> int:
     """Return the number of the critical joint."""
-    return int(ranked(arrays)[0])
+    return int(rank_joints(arrays)[0])

@@ -157,7 +157,7 @@ def health(
         **more,
         "added_mass_fraction": (steps.added_mass / steps.model_mass, ADDED_MASS_LIMIT),
     }
-    return checked(checks | hourglass_check(outcome.history, request.formulation))
+    return make_checks(checks | hourglass_check(outcome.history, request.formulation))
 
 
 def hourglass_check(history: History, formulation: str) -> dict[str, tuple[float, float]]:
@@ -171,6 +171,6 @@ def hourglass_check(history: History, formulation: str) -> dict[str, tuple[float
     return {"hourglass_energy_fraction": (hourglass / history.balance.largest, HOURGLASS_LIMIT)} if hourglass else {}
 
 
-def checked(checks: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
+def make_checks(checks: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
     """Return named checks with value, limit and whether the value is at most the limit."""
     return {name: {"value": value, "limit": limit, "ok": value <= limit} for name, (value, limit) in checks.items()}

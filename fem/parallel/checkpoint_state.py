@@ -147,21 +147,21 @@ def leaves(state: "State | Entry") -> Iterator[Entry]:
         yield state
 
 
-def mapped(state: "State | Entry", change: Callable[[Entry], Any]) -> Any:
+def map_state(state: "State | Entry", change: Callable[[Entry], Any]) -> Any:
     """Return the tree of a state with each entry replaced by ``change(entry)``."""
     if isinstance(state, Mapping):
-        return {name: mapped(node, change) for name, node in state.items()}
+        return {name: map_state(node, change) for name, node in state.items()}
     return change(state)
 
 
 def values(state: State) -> dict[str, Any]:
     """Return the tree of values, the argument of ``restore``."""
-    return mapped(state, lambda entry: entry.value)
+    return map_state(state, lambda entry: entry.value)
 
 
 def blank(state: State) -> State:
     """Return an empty state for the same nodes and cells."""
-    return mapped(state, lambda entry: entry.blank())
+    return map_state(state, lambda entry: entry.blank())
 
 
 def layout(state: State) -> str:

@@ -118,21 +118,21 @@ class SharedNodes:
 
 
 def rank_order(
-    rows: NDArray[np.int32], ranks: NDArray[np.int64], own: int
+    rows: NDArray[np.int32], ranks: NDArray[np.int64], own_rank: int
 ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
     """Return the order in which the contributions to each shared node are summed, by rank.
 
     Args:
         rows: Local node of each received row, shape (k,).
         ranks: Sending rank of each received row, shape (k,).
-        own: This rank.
+        own_rank: This rank.
 
     Returns:
         Nodes (m,), pointer (m + 1,) and sources (-1 for this rank) of ``kernels.motion.sum_in_rank_order``.
     """
     nodes = np.unique(rows)
     node = np.concatenate([rows, nodes])
-    rank = np.concatenate([ranks, np.full(len(nodes), own)])
+    rank = np.concatenate([ranks, np.full(len(nodes), own_rank)])
     source = np.concatenate([np.arange(len(rows)), np.full(len(nodes), -1)])
     order = np.lexsort((rank, node))
     pointer = np.concatenate([[0], np.cumsum(np.bincount(np.searchsorted(nodes, node), minlength=len(nodes)))])

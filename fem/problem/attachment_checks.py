@@ -25,7 +25,7 @@ def fitting_problems(fittings: Fittings, body: Structure) -> Iterator[Problem]:
     for name, mass in fittings.masses.items():
         yield from _mass(f"masses.{name}", mass, body)
     for name, point in fittings.watch.items():
-        yield from inside(f"watch.{name}.at", point.at, body)
+        yield from position_problems(f"watch.{name}.at", point.at, body)
         yield from _direction(f"watch.{name}.direction", point.direction)
     for name, gauge in fittings.gauges.items():
         yield from _gauge(f"gauges.{name}", gauge, body)
@@ -66,7 +66,10 @@ def _gauge(key: str, gauge: StrainGauge, body: Structure) -> Iterator[Problem]:
     """Yield a gauge whose centre or ends, or their mirror images, lie off the face."""
     low, high = body.corners
     height = high[2] if gauge.face == "upper" else low[2]
-    misplaced = [*_direction(f"{key}.direction", gauge.direction), *inside(f"{key}.at", (*gauge.at, height), body)]
+    misplaced = [
+        *_direction(f"{key}.direction", gauge.direction),
+        *position_problems(f"{key}.at", (*gauge.at, height), body),
+    ]
     yield from misplaced
     if misplaced:
         return
@@ -74,8 +77,8 @@ def _gauge(key: str, gauge: StrainGauge, body: Structure) -> Iterator[Problem]:
     for side in (reach, -reach):
         end = [x + side * along for x, along in zip(gauge.at, gauge.direction, strict=True)]
         x, y = (abs(value) if axis in body.symmetry else value for axis, value in zip(AXES, end, strict=False))
-        yield from inside(f"{key}.length", (x, y, height), body)
-        yield from in_hole(f"{key}.length", (x, y, height), body)
+        yield from position_problems(f"{key}.length", (x, y, height), body)
+        yield from hole_problems(f"{key}.length", (x, y, height), body)
 
 
 def _elastic(problem: StructureProblem) -> Iterator[Problem]:
@@ -95,16 +98,16 @@ def _elastic(problem: StructureProblem) -> Iterator[Problem]:
 def _mass(key: str, mass: PointMass, structure: Structure) -> Iterator[Problem]:
     whole = structure.model_copy(update={"symmetry": ()})
     if mass.footprint is None:
-        yield from inside(f"{key}.at", mass.at, structure)
-        yield from in_hole(f"{key}.at", mass.at, structure)
+        yield from position_problems(f"{key}.at", mass.at, structure)
+        yield from hole_problems(f"{key}.at", mass.at, structure)
         return
     half = [0.5 * side for side in mass.footprint]
-    outside = list(inside(f"{key}.at", mass.at, structure))
+    outside = list(position_problems(f"{key}.at", mass.at, structure))
     yield from outside
     for signs in ((-1, -1), (1, 1)):
         corner = (mass.at[0] + signs[0] * half[0], mass.at[1] + signs[1] * half[1], mass.at[2])
         if not outside:
-            yield from inside(f"{key}.footprint", corner, whole)
+            yield from position_problems(f"{key}.footprint", corner, whole)
     for axis in structure.symmetry:
         k = AXES.index(axis)
         if axis not in structure.planes_at(mass.at) and mass.at[k] < half[k]:
@@ -112,7 +115,7 @@ def _mass(key: str, mass: PointMass, structure: Structure) -> Iterator[Problem]:
             yield Problem(f"{key}.footprint", message, _metres(mass.footprint), f"at {axis} = 0, or on one side of it")
 
 
-def inside(key: str, point: tuple[float, float, float], structure: Structure) -> Iterator[Problem]:
+def position_problems(key: str, point: tuple[float, float, float], structure: Structure) -> Iterator[Problem]:
     """Yield a problem if a point [m] lies outside the meshed box."""
     low, high = structure.corners
     nearest = [min(max(x, a), b) for x, a, b in zip(point, low, high, strict=True)]
@@ -122,7 +125,7 @@ def inside(key: str, point: tuple[float, float, float], structure: Structure) ->
         yield Problem(key, message, _metres(point), f"{_metres(low)} to {_metres(high)}")
 
 
-def in_hole(key: str, point: tuple[float, float, float], structure: Structure) -> Iterator[Problem]:
+def hole_problems(key: str, point: tuple[float, float, float], structure: Structure) -> Iterator[Problem]:
     """Yield a problem if a point [m] lies inside a mounting hole."""
     holes = structure.holes
     if holes is None:

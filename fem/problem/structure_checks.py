@@ -3,7 +3,12 @@
 import math
 from collections.abc import Iterator
 
-from reflowshock.fem.problem.attachment_checks import attachment_problems, filter_problems, in_hole, inside
+from reflowshock.fem.problem.attachment_checks import (
+    attachment_problems,
+    filter_problems,
+    hole_problems,
+    position_problems,
+)
 from reflowshock.fem.problem.fittings import AXES
 from reflowshock.fem.problem.load_kinds import (
     AtPoint,
@@ -61,8 +66,8 @@ def _load(key: str, load: StructureLoad, problem: StructureProblem) -> Iterator[
     if isinstance(load, OnNodes | OnAreas):
         yield from unknown_name(f"{key}.on", load.on, problem.structure.facet_sets, "facet set")
     if isinstance(load, AtPoint):
-        yield from inside(f"{key}.at", load.at, problem.structure)
-        yield from in_hole(f"{key}.at", load.at, problem.structure)
+        yield from position_problems(f"{key}.at", load.at, problem.structure)
+        yield from hole_problems(f"{key}.at", load.at, problem.structure)
     if isinstance(load, OnBody | AtPoint) and not math.hypot(*load.direction) > 0.0:
         yield Problem(f"{key}.direction", "has no length", list(load.direction), "any vector but zero")
     if isinstance(load, InputG) and load.method == "direct" and not _is_held(problem):

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from reflowshock.fem import dolfinx_api
 from reflowshock.fem.division.fine_joints import read_package
-from reflowshock.fem.division.tables import JointTables, ModelInput, joined, model_inputs
+from reflowshock.fem.division.tables import JointTables, ModelInput, join_meshes, model_inputs
 from reflowshock.fem.division.whole import Whole
 from reflowshock.fem.dynamics.participant import explicit_motion
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.supports import SYMMETRY
-from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, RankElements, make_body, make_rank_elements
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.output.cooling_report import Convergence, CooledPackage, write_cooling
 from reflowshock.fem.parallel.agreement import agreed
@@ -39,19 +39,19 @@ def run_cooling(world: MPI.Comm, request: CoolingInput) -> None:
         AgreedError: The input or a mesh does not fit, or equilibrium is not reached; on every rank.
     """
     start = time.perf_counter()
-    package = agreed(world, lambda: pinned_package(request) if world.rank == 0 else None)
+    package = agreed(world, lambda: read_pinned_package(request) if world.rank == 0 else None)
     tables: JointTables = world.bcast(package.model.tables if package else None)
     ACTIVITY.slow = "cools the model"
-    pieces = distributed(world, package.model.mesh if package else None, tables, request)
-    ones = np.ones(len(pieces.steps))
-    body = make_body(world, pieces, tables, ones, ForceOptions())
-    statics = Statics(world, body, pieces.materials, request.change)
+    rank_elements = distribute_model(world, package.model.mesh if package else None, tables, request)
+    ones = np.ones(len(rank_elements.steps))
+    body = make_body(world, rank_elements, tables, ones, ForceOptions())
+    statics = Statics(world, body, rank_elements.materials, request.change)
     equilibrium, memory = statics.solve(), statics.memory
     statics.free()
-    loaded = with_initial_stress(body, pieces.materials, equilibrium.displacement, request.change, path=True)
-    residual, seconds = unbalanced_force(world, loaded, statics.scale), time.perf_counter() - start
+    loaded = with_initial_stress(body, rank_elements.materials, equilibrium.displacement, request.change, path=True)
+    residual, seconds = measure_unbalanced_force(world, loaded, statics.scale), time.perf_counter() - start
     convergence = Convergence(equilibrium.residuals, residual, equilibrium.products, memory, seconds)
-    displacement = whole_displacement(world, body, equilibrium, package)
+    displacement = gather_displacement(world, body, equilibrium, package)
     cooled = None
     if package and displacement is not None:
         cooled = CooledPackage(package.whole, Cooling(package.whole.mesh.points, displacement, request.change))
@@ -72,33 +72,35 @@ class PinnedPackage:
     model: ModelInput[JointTables]
 
 
-def pinned_package(request: CoolingInput) -> PinnedPackage:
+def read_pinned_package(request: CoolingInput) -> PinnedPackage:
     """Read all meshes as one model on its symmetry planes, with all other rigid-body motions pinned."""
-    whole = joined(read_package(request))
-    return PinnedPackage(whole, pinned(model_inputs(whole, "dns", SYMMETRY)["dns"]))
+    whole = join_meshes(read_package(request))
+    return PinnedPackage(whole, add_pins(model_inputs(whole, "dns", SYMMETRY)["dns"]))
 
 
-def pinned(item: ModelInput[JointTables]) -> ModelInput[JointTables]:
+def add_pins(item: ModelInput[JointTables]) -> ModelInput[JointTables]:
     """Return a model with pins against every unconstrained rigid-body motion."""
     tables = item.tables
     held, usable = np.zeros((tables.nodes, 3), dtype=bool), np.zeros(tables.nodes, dtype=bool)
     held[tables.held_nodes] = tables.held
     usable[item.mesh.cells] = True
     usable[tables.tie.slave] = False
-    held[pins(item.mesh.points, held, usable)] = True
+    held[choose_pins(item.mesh.points, held, usable)] = True
     nodes = np.flatnonzero(held.any(axis=1))
     return replace(item, tables=replace(tables, held_nodes=nodes, held=held[nodes]))
 
 
-def distributed(world: MPI.Comm, mesh: MeshData | None, tables: JointTables, request: CoolingInput) -> Pieces:
+def distribute_model(
+    world: MPI.Comm, mesh: MeshData | None, tables: JointTables, request: CoolingInput
+) -> RankElements:
     """Distribute the mesh and assign materials to the elements of each rank; collective."""
     dolfinx_api.compile_ahead(world, mesh.points[mesh.cells[0]] if mesh else None)
     local = distribute(world, mesh)
     formulation = request.shock.numerics.formulation
-    return agreed(world, lambda: make_pieces(local, tables, request.materials, formulation))
+    return agreed(world, lambda: make_rank_elements(local, tables, request.materials, formulation))
 
 
-def unbalanced_force(world: MPI.Comm, body: Body, scale: float) -> float:
+def measure_unbalanced_force(world: MPI.Comm, body: Body, scale: float) -> float:
     """Return the norm of the unbalanced force at the start of the shock, relative to ``scale`` [N]; collective."""
     motion = explicit_motion(body, [], 1.0)
     motion.update_force()
@@ -107,7 +109,7 @@ def unbalanced_force(world: MPI.Comm, body: Body, scale: float) -> float:
     return float(np.sqrt(square)) / scale if scale > 0.0 else 0.0
 
 
-def whole_displacement(
+def gather_displacement(
     world: MPI.Comm, body: Body, equilibrium: Equilibrium, package: PinnedPackage | None
 ) -> NDArray[np.float64] | None:
     """Return the displacement of all nodes of the joined mesh, shape (n, 3) [m], on rank 0, else None; collective."""
@@ -123,7 +125,7 @@ def whole_displacement(
     return result
 
 
-def pins(
+def choose_pins(
     points: NDArray[np.float64], held: NDArray[np.bool_], usable: NDArray[np.bool_]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Choose displacement components that make the support statically determinate.
@@ -149,7 +151,11 @@ def pins(
 
 
 def rigid_motions(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return translations along and rotations about x, y, z, shape (n, 3, 6); lengths in units of the body's size."""
+    """Return translations along and rotations about x, y, z, shape (n, 3, 6), with lengths in units of the body's size.
+
+    Args:
+        points: Nodes, shape (n, 3) [m].
+    """
     scaled = (points - points.mean(axis=0)) / np.ptp(points, axis=0).max()
     motions = np.zeros((len(points), 3, 6))
     for axis in range(3):

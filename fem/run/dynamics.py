@@ -122,7 +122,7 @@ def run_dynamics(world: MPI.Comm, problem: DynamicProblem) -> None:
         agreed(comms.world, lambda: None)
 
 
-def place(world: MPI.Comm, divided: DividedModels[Any], request: RunInput | StructureInput) -> Plan:
+def place_models(world: MPI.Comm, divided: DividedModels[Any], request: RunInput | StructureInput) -> Plan:
     """Assign the divided models and their cells to ranks, and print the assignment; collective."""
     works, ranks = works_of(divided, request), request.ranks(world.size)
     return plan_ranks(world, works, ranks, request.checkpoints, divided.scheme)
@@ -176,7 +176,7 @@ def make_outputs(comms: Communicators, problem: DynamicProblem, models: Models, 
 
 
 def make_history(world: MPI.Comm, problem: DynamicProblem, models: Models, steps: Steps) -> History:
-    """Return an empty history with the watch points of this rank."""
+    """Return an empty history with the watch points of this rank and the limit of the energy balance."""
     limit, trivial = problem.request.numerics.energy_balance_limit, problem.trivial_energy(steps)
     balance = EnergyBalance(limit, trivial, steps.plan.step, steps.smallest)
     watches = {role: problem.watch(model) for role, model in models.items()}

@@ -12,7 +12,7 @@ from reflowshock.fem.division.checks import check_pulses
 from reflowshock.fem.division.tables import JointTables
 from reflowshock.fem.dynamics.history import History, Signal
 from reflowshock.fem.dynamics.modal import natural_modes
-from reflowshock.fem.estimates.estimate import implicit_plan, largest_implicit_step, shortened
+from reflowshock.fem.estimates.estimate import implicit_plan, largest_implicit_step, shorten_plan
 from reflowshock.fem.estimates.placement import check_size
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.loads.pulse import Pulse
@@ -31,9 +31,9 @@ from reflowshock.fem.parallel.communicators import Communicators, Role
 from reflowshock.fem.parallel.rank_activity import ACTIVITY
 from reflowshock.fem.problem.inputs import RunInput
 from reflowshock.fem.problem.kinematics import TURNING
-from reflowshock.fem.run.dynamics import place, run_dynamics
+from reflowshock.fem.run.dynamics import place_models, run_dynamics
 from reflowshock.fem.setup.models import DividedModels, Model
-from reflowshock.fem.setup.package_models import build_package, divided_package, elastic_package
+from reflowshock.fem.setup.package_models import build_elastic_package, build_package, divide_package
 
 SPEEDS = 201  # sampling points of the drop table's velocity
 NON_TRIVIAL = 1e-4  # fraction of a free body's pulse energy above which the balance is checked
@@ -52,7 +52,7 @@ class PackageDrop:
         """Read and divide the meshes; collective; raises as ``run_dynamics``."""
         if request.coupled:
             check_size(request.shock.ranks, world.size)
-        divided = divided_package(world, request)
+        divided = divide_package(world, request)
         return cls(request, divided, agreed(world, lambda: pulse_of(request, divided.steps.plan.window)))
 
     @property
@@ -67,7 +67,7 @@ class PackageDrop:
 
     def place(self, world: MPI.Comm) -> Plan:
         """Assign models and cells to ranks."""
-        return place(world, self.divided, self.request)
+        return place_models(world, self.divided, self.request)
 
     def build(
         self, comms: Communicators, cells: Mapping[Role, NDArray[np.int32]]
@@ -78,7 +78,7 @@ class PackageDrop:
         ends = [request.end, shock.numerics.dns_duration if request.mode == "dns" else None]
         end = min((end for end in ends if end is not None), default=shock.decided_duration)
         if end < shock.decided_duration:
-            steps = replace(steps, plan=shortened(steps.plan, end))
+            steps = replace(steps, plan=shorten_plan(steps.plan, end))
         if request.implicit:
             largest = largest_implicit_step(shock.decided_duration, pulse_durations({"drop": self.pulse}))
             steps = replace(steps, plan=implicit_plan(steps.plan, largest))
@@ -138,7 +138,7 @@ def modes_of(request: RunInput) -> ModeTable:
     Raises:
         ValueError: More modes are requested than there are equations.
     """
-    model, mass = elastic_package(request)
+    model, mass = build_elastic_package(request)
     modes = natural_modes(Equations.of(MPI.COMM_SELF, model.body), request.shock.modes)
     table = ModeTable(modes.frequency, modes.effective_mass / mass)
     write_modes(request.output, table)

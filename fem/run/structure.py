@@ -23,10 +23,10 @@ from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.parallel.communicators import Communicators, Role
 from reflowshock.fem.problem.inputs import StructureInput
 from reflowshock.fem.problem.kinematics import TURNING
-from reflowshock.fem.run.dynamics import place, run_dynamics
+from reflowshock.fem.run.dynamics import place_models, run_dynamics
 from reflowshock.fem.run.time_loop import Pictures
 from reflowshock.fem.setup.models import DividedModels
-from reflowshock.fem.setup.structure_models import StructureModel, build_coupled, build_structure, divided_structure
+from reflowshock.fem.setup.structure_models import StructureModel, build_coupled, build_structure, divide_structure
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class StructureDynamics:
     def read(cls, world: MPI.Comm, request: StructureInput) -> "StructureDynamics":
         """Read the pulses, and divide the mesh of two coupled models; collective; raises as ``run_dynamics``."""
         pulses = agreed(world, lambda: pulses_of(request.loads))
-        return cls(request, divided_structure(world, request) if request.coupled else None, pulses)
+        return cls(request, divide_structure(world, request) if request.coupled else None, pulses)
 
     @property
     def signals(self) -> Mapping[str, Signal]:
@@ -57,7 +57,7 @@ class StructureDynamics:
         """Assign models and cells to ranks; a single model is on all ranks."""
         if self.divided is None:
             return Plan(shared(("structure",), world.size), {}, {})
-        return place(world, self.divided, self.request)
+        return place_models(world, self.divided, self.request)
 
     def build(
         self, comms: Communicators, cells: Mapping[Role, NDArray[np.int32]]

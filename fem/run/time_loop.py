@@ -92,21 +92,21 @@ def run_time_loop(
     state = outputs.checkpoints.read(state_of(participants, outputs))
     if state is not None and outputs.checkpoints.continued is not None:
         first = outputs.checkpoints.continued + 1
-        output_seconds += resume(
+        output_seconds += restore_checkpoint(
             participants, outputs, state, [window for window in sorted(field_windows) if window < first]
         )
     for window in range(first, plan.windows + 1):
         ACTIVITY.window = window
         if window:
             run_window(participants, stopwatch)
-        sampled = watch(participants, outputs, window)
+        sampled = take_samples(participants, outputs, window)
         over = window == plan.windows or (sampled and is_over(world, outputs))
         if over or window in field_windows:
             output_seconds += write_fields(participants, outputs, window)
         if over:
             break
         if sampled and outputs.checkpoints.is_due():
-            save(participants, outputs, window)
+            write_checkpoint(participants, outputs, window)
         if world.rank == 0 and time.perf_counter() - reported > PROGRESS_INTERVAL:
             reported = time.perf_counter()
             print(json.dumps({"progress": window / plan.windows, "time": time_of(participants)}), flush=True)
@@ -126,7 +126,7 @@ def is_over(world: MPI.Comm, outputs: Outputs) -> bool:
     return over
 
 
-def watch(participants: Participants, outputs: Outputs, window: int) -> bool:
+def take_samples(participants: Participants, outputs: Outputs, window: int) -> bool:
     """Take the samples and snapshots due after a window, and return whether a sample was due."""
     plan = next(iter(participants.values())).plan
     sampled = window % plan.stride == 0 or window == plan.windows
@@ -189,13 +189,15 @@ def state_of(participants: Participants, outputs: Outputs) -> State:
     return models | {"history": outputs.history.state()} | pictures
 
 
-def save(participants: Participants, outputs: Outputs, window: int) -> None:
+def write_checkpoint(participants: Participants, outputs: Outputs, window: int) -> None:
     """Write a checkpoint at the end of a window."""
     with ACTIVITY.busy("writes a checkpoint"):
         outputs.checkpoints.write(window, time_of(participants), state_of(participants, outputs))
 
 
-def resume(participants: Participants, outputs: Outputs, state: dict[str, Any], field_windows: list[int]) -> float:
+def restore_checkpoint(
+    participants: Participants, outputs: Outputs, state: dict[str, Any], field_windows: list[int]
+) -> float:
     """Restore a checkpoint and rewrite its earlier fields; return the time spent on fields [s]."""
     checkpoints = outputs.checkpoints
     for role, participant in participants.items():
@@ -213,5 +215,5 @@ def resume(participants: Participants, outputs: Outputs, state: dict[str, Any], 
             stored = checkpoints.stored(f"{role}-{window}", {role: like[role]})
             outputs.fields[role].write(FieldSample(**stored[role]))
     if checkpoints.moved and checkpoints.continued is not None:
-        save(participants, outputs, checkpoints.continued)
+        write_checkpoint(participants, outputs, checkpoints.continued)
     return time.perf_counter() - begin

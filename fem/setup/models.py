@@ -13,7 +13,7 @@ from reflowshock.fem.division.division import Rules, SchemeName
 from reflowshock.fem.division.tables import Tables, TablesT_co
 from reflowshock.fem.division.whole import Treatment
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, RankElements, make_body, make_rank_elements
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.steps import Steps
 from reflowshock.fem.parallel.agreement import agreed
@@ -26,7 +26,12 @@ from reflowshock.fem.statics.initial_state import InitialState
 
 @dataclass(frozen=True, slots=True)
 class Model(Generic[TablesT_co]):
-    """Tables and body of one model on one rank."""
+    """One model on one rank.
+
+    Attributes:
+        tables: Supports, interfaces and watch points of the whole model.
+        body: Nodes, elements and masses of this rank.
+    """
 
     tables: TablesT_co
     body: Body
@@ -63,7 +68,7 @@ def treatment_of(request: RunInput | StructureInput, mass_scaled_step: float | N
     return Treatment(request.formulation, request.kinematics, numerics.mass_scaled, mass_scaled_step or np.inf)
 
 
-def divided_on_root(world: MPI.Comm, divide: Callable[[], DividedModels[TablesT_co]]) -> DividedModels[TablesT_co]:
+def divide_on_root(world: MPI.Comm, divide: Callable[[], DividedModels[TablesT_co]]) -> DividedModels[TablesT_co]:
     """Divide the models on rank 0 and broadcast all data except the meshes; collective.
 
     Raises:
@@ -74,12 +79,12 @@ def divided_on_root(world: MPI.Comm, divide: Callable[[], DividedModels[TablesT_
     return divided or shared
 
 
-def distributed(
+def distribute_models(
     comms: Communicators,
     divided: DividedModels[TablesT_co],
     ranks: Mapping[Role, NDArray[np.int32]],
     request: RunInput | StructureInput,
-) -> dict[Role, Pieces]:
+) -> dict[Role, RankElements]:
     """Distribute the models and assign materials to the elements of this rank; collective.
 
     Args:
@@ -96,18 +101,31 @@ def distributed(
     dolfinx_api.compile_ahead(comms.world, first_mesh.points[first_mesh.cells[0]] if first_mesh else None)
     meshes = {role: distribute(comms.models[role], *part) for role, part in parts.items()}
 
-    def pieces_of(role: Role) -> Pieces:
-        return make_pieces(meshes[role], divided.tables[role], request.part_materials, request.formulation)
+    def rank_elements_of(role: Role) -> RankElements:
+        return make_rank_elements(meshes[role], divided.tables[role], request.part_materials, request.formulation)
 
-    return agreed(comms.world, lambda: {role: pieces_of(role) for role in meshes})
+    return agreed(comms.world, lambda: {role: rank_elements_of(role) for role in meshes})
 
 
-def assembled(
-    comms: Communicators, divided: DividedModels[TablesT_co], pieces: Mapping[Role, Pieces], kinematics: Kinematics
+def assemble_bodies(
+    comms: Communicators,
+    divided: DividedModels[TablesT_co],
+    rank_elements: Mapping[Role, RankElements],
+    kinematics: Kinematics,
 ) -> dict[Role, Body]:
-    """Assemble the bodies of this rank's models with their time steps; collective."""
+    """Assemble the bodies of this rank's models with their time steps and initial stress; collective.
+
+    Args:
+        comms: Communicators of the run and of its models.
+        divided: Models before distribution.
+        rank_elements: Elements of this rank by model.
+        kinematics: Kinematics of the elements.
+
+    Returns:
+        Bodies by model.
+    """
     bodies = {}
-    for role, elements in pieces.items():
+    for role, elements in rank_elements.items():
         factor = divided.mass_factors[role][elements.local.cell_numbers]
         response = ForceOptions(kinematics, divided.steps.step_of(role), divided.rules.stiffness)
         body = make_body(comms.models[role], elements, divided.tables[role], factor, response)

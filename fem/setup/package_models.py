@@ -11,45 +11,52 @@ from reflowshock.fem.division.checks import check_division
 from reflowshock.fem.division.divide import divide
 from reflowshock.fem.division.division import Rules
 from reflowshock.fem.division.fine_joints import copied_joints, joint_of, read_package
-from reflowshock.fem.division.fitted import FittedTable, fitted_to
+from reflowshock.fem.division.fitted import FittedTable, fit_to_mesh
 from reflowshock.fem.division.neighbours import with_neighbours
 from reflowshock.fem.division.record import coupling_record
-from reflowshock.fem.division.tables import JointTables, joined, model_inputs
-from reflowshock.fem.division.whole import Whole, on_springs, survey
+from reflowshock.fem.division.tables import JointTables, join_meshes, model_inputs
+from reflowshock.fem.division.whole import Whole, add_spring_stiffness, survey
 from reflowshock.fem.loads.shock_loads import check_shaken
 from reflowshock.fem.mesh.column import COPY
 from reflowshock.fem.mesh.supports import HELD, SYMMETRY
-from reflowshock.fem.model.assembly import make_body, make_pieces
+from reflowshock.fem.model.assembly import make_body, make_rank_elements
 from reflowshock.fem.model.attachments import beddings_of, with_attachments, with_support_stiffness
-from reflowshock.fem.model.steps import Steps, agreed_minimum, assembled_step, steps_of_division, undivided
+from reflowshock.fem.model.steps import Steps, assembled_step, find_minimum, single_model_steps, steps_of_division
 from reflowshock.fem.parallel.communicators import Communicators, Role
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.problem.fittings import AXES, Fittings
 from reflowshock.fem.problem.inputs import RunInput
-from reflowshock.fem.setup.models import DividedModels, Model, assembled, distributed, divided_on_root, treatment_of
+from reflowshock.fem.setup.models import (
+    DividedModels,
+    Model,
+    assemble_bodies,
+    distribute_models,
+    divide_on_root,
+    treatment_of,
+)
 from reflowshock.fem.statics.initial_state import Cooling, InitialState
 from reflowshock.materials.roles import role_of_part
 
 COARSE = "board"  # material role of the macro model
 
 
-def divided_package(world: MPI.Comm, request: RunInput) -> DividedModels[JointTables]:
+def divide_package(world: MPI.Comm, request: RunInput) -> DividedModels[JointTables]:
     """Read, check and divide all meshes on rank 0, and broadcast the result; collective.
 
     Raises:
         AgreedError: The meshes do not fit the input; on every rank.
     """
-    return divided_on_root(world, lambda: divided_on_one_rank(request))
+    return divide_on_root(world, lambda: divide_on_one_rank(request))
 
 
-def divided_on_one_rank(request: RunInput) -> DividedModels[JointTables]:
+def divide_on_one_rank(request: RunInput) -> DividedModels[JointTables]:
     """Read, check and divide all meshes; raises as ``read_package`` and ``division.checks``."""
     shock = request.shock
-    whole = joined(with_neighbours(read_package(request), request.packages))
-    fitted = fitted_board(whole, request)
+    whole = join_meshes(with_neighbours(read_package(request), request.packages))
+    fitted = fit_board(whole, request)
     treatment = treatment_of(request, request.numerics.mass_scaled_step)
     unsupported = survey(whole.mesh, request.materials, treatment)
-    elements = on_springs(unsupported, whole.mesh, fitted, request.supports)
+    elements = add_spring_stiffness(unsupported, whole.mesh, fitted, request.supports)
     coarse = whole.mesh.in_parts(lambda name: role_of_part(name) == COARSE and not joint_of(name))
     sprung = bool(fitted and fitted.bedded)
     rules = Rules.of_shock(shock, coarse, shock.decided_duration, sprung=sprung, cooled=bool(request.cooling))
@@ -62,9 +69,9 @@ def divided_on_one_rank(request: RunInput) -> DividedModels[JointTables]:
     steps = steps_of_division(whole, elements, division, rules)
     if fitted:
         steps = replace(steps, model_mass=steps.model_mass + float(fitted.masses[1].sum()))
-    held = held_by(request)
+    held = find_fixed_components(request)
     if request.mode == "dns":
-        steps = undivided(steps, float(elements.step.min()), rules)
+        steps = single_model_steps(steps, float(elements.step.min()), rules)
         inputs = model_inputs(whole, "dns", held, shock.joint_layer, fitted)
     else:
         check_division(whole, elements, division, rules)
@@ -86,15 +93,15 @@ def divided_on_one_rank(request: RunInput) -> DividedModels[JointTables]:
     )
 
 
-def fitted_board(whole: Whole, request: RunInput) -> FittedTable | None:
-    """Return the fittings of the board as tables, None if there are none; raises as ``fitted_to``."""
+def fit_board(whole: Whole, request: RunInput) -> FittedTable | None:
+    """Return the fittings of the board as tables, None if there are none; raises as ``fit_to_mesh``."""
     if not any(getattr(request, name) for name in Fittings.model_fields):
         return None
     board = whole.mesh.in_parts(lambda name: role_of_part(name) == COARSE and COPY not in name)
-    return fitted_to(whole.mesh, board, request, request.materials.board.plasticity is not None)
+    return fit_to_mesh(whole.mesh, board, request, request.materials.board.plasticity is not None)
 
 
-def held_by(request: RunInput) -> dict[str, tuple[int, ...]]:
+def find_fixed_components(request: RunInput) -> dict[str, tuple[int, ...]]:
     """Return the fixed components by facet set, as in ``HELD``, for hole walls, supports or a large mass."""
     if request.shock.method == "large_mass":
         return SYMMETRY
@@ -122,19 +129,22 @@ def build_package(
         Models of this rank, and the time steps, which power iteration may increase in a DNS.
     """
     steps = divided.steps
-    pieces = distributed(comms, divided, ranks, request)
+    rank_elements = distribute_models(comms, divided, ranks, request)
     beddings = {
-        role: beddings_of(part.local, divided.tables[role].fitted, request.supports) for role, part in pieces.items()
+        role: beddings_of(part.local, divided.tables[role].fitted, request.supports)
+        for role, part in rank_elements.items()
     }
     for role, springs in beddings.items():
         for bedding in springs:
-            pieces[role] = with_support_stiffness(pieces[role], bedding)
-    if "dns" in pieces and request.numerics.critical_step == "power_iteration":
-        factor = divided.mass_factors["dns"][pieces["dns"].local.cell_numbers]
-        whole_step = assembled_step(comms.models["dns"], pieces["dns"], divided.tables["dns"], factor, beddings["dns"])
-        element_step = agreed_minimum(comms.world, [pieces["dns"].steps * np.sqrt(factor)])
-        steps = undivided(steps, max(whole_step, element_step), divided.rules)
-    bodies = assembled(comms, replace(divided, steps=steps), pieces, request.kinematics)
+            rank_elements[role] = with_support_stiffness(rank_elements[role], bedding)
+    if "dns" in rank_elements and request.numerics.critical_step == "power_iteration":
+        factor = divided.mass_factors["dns"][rank_elements["dns"].local.cell_numbers]
+        whole_step = assembled_step(
+            comms.models["dns"], rank_elements["dns"], divided.tables["dns"], factor, beddings["dns"]
+        )
+        element_step = find_minimum(comms.world, [rank_elements["dns"].steps * np.sqrt(factor)])
+        steps = single_model_steps(steps, max(whole_step, element_step), divided.rules)
+    bodies = assemble_bodies(comms, replace(divided, steps=steps), rank_elements, request.kinematics)
     models = {
         role: Model(table := divided.tables[role], with_attachments(body, *table.fitted.masses, beddings[role]))
         for role, body in bodies.items()
@@ -142,7 +152,7 @@ def build_package(
     return models, steps
 
 
-def elastic_package(request: RunInput) -> tuple[Model[JointTables], float]:
+def build_elastic_package(request: RunInput) -> tuple[Model[JointTables], float]:
     """Return package and board as one linear elastic model on a single rank, and its mass [kg].
 
     Coarse joints are used if a mesh of them exists, since the modes of the board do not depend on joint details.
@@ -151,10 +161,12 @@ def elastic_package(request: RunInput) -> tuple[Model[JointTables], float]:
     meshes = (request.meshes[0], request.coarse_joints) if request.coarse_joints else request.meshes
     shock = request.shock.model_copy(update={"coupling": coupling, "method": "direct"})
     single = request.model_copy(update={"shock": shock, "meshes": meshes, "watch": {}, "gauges": {}})
-    whole = joined(with_neighbours(read_package(single), request.packages))
-    model = model_inputs(whole, "dns", held_by(single), shock.joint_layer, fitted_board(whole, single))["dns"]
+    whole = join_meshes(with_neighbours(read_package(single), request.packages))
+    model = model_inputs(whole, "dns", find_fixed_components(single), shock.joint_layer, fit_board(whole, single))[
+        "dns"
+    ]
     tables, local = model.tables, distribute(MPI.COMM_SELF, model.mesh)
-    pieces = make_pieces(local, tables, request.materials, request.formulation)
-    body = make_body(MPI.COMM_SELF, pieces, tables, np.ones(len(pieces.steps)), None)
+    rank_elements = make_rank_elements(local, tables, request.materials, request.formulation)
+    body = make_body(MPI.COMM_SELF, rank_elements, tables, np.ones(len(rank_elements.steps)), None)
     body = with_attachments(body, *tables.fitted.masses, beddings_of(local, tables.fitted, request.supports))
     return Model(tables, body), float(body.mass.sum())

@@ -14,7 +14,7 @@ from reflowshock.fem.division.checks import check_division
 from reflowshock.fem.division.divide import divide
 from reflowshock.fem.division.division import Division, Rules
 from reflowshock.fem.division.record import coupling_record
-from reflowshock.fem.division.structure_tables import StructureTables, structure_tables, tied
+from reflowshock.fem.division.structure_tables import StructureTables, structure_tables, tie_layers
 from reflowshock.fem.division.tables import split
 from reflowshock.fem.division.whole import Survey, Whole, survey
 from reflowshock.fem.errors import CouplingError, StepError
@@ -23,7 +23,7 @@ from reflowshock.fem.forces.force import linear_terms
 from reflowshock.fem.loads.structure_pulses import pulse_durations, pulses_of
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.mesh_file import read_mesh
-from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, RankElements, make_body, make_rank_elements
 from reflowshock.fem.model.attachments import beddings_of, with_attachments, with_support_stiffness
 from reflowshock.fem.model.power_iteration import highest_frequency
 from reflowshock.fem.model.steps import (
@@ -40,7 +40,14 @@ from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.problem.inputs import StructureInput
 from reflowshock.fem.problem.load_kinds import PrescribedMotion
 from reflowshock.fem.problem.structure import LayerCoupling, fine_layers
-from reflowshock.fem.setup.models import DividedModels, Model, assembled, distributed, divided_on_root, treatment_of
+from reflowshock.fem.setup.models import (
+    DividedModels,
+    Model,
+    assemble_bodies,
+    distribute_models,
+    divide_on_root,
+    treatment_of,
+)
 
 StructureModel = Model[StructureTables]
 
@@ -58,15 +65,17 @@ def build_structure(comm: MPI.Comm, request: StructureInput, pulses: list[float]
     """
     mesh, tables = read_structure(comm, request)
     local = distribute(comm, mesh)
-    pieces = agreed(comm, lambda: make_pieces(local, tables, request.part_materials, request.formulation))
-    beddings = beddings_of(pieces.local, tables.fitted, request.supports)
+    rank_elements = agreed(comm, lambda: make_rank_elements(local, tables, request.part_materials, request.formulation))
+    beddings = beddings_of(rank_elements.local, tables.fitted, request.supports)
     for bedding in beddings:
-        pieces = with_support_stiffness(pieces, bedding)
-    steps = choose_steps(comm, pieces, request, pulses)
+        rank_elements = with_support_stiffness(rank_elements, bedding)
+    steps = choose_steps(comm, rank_elements, request, pulses)
     steps = replace(steps, model_mass=steps.model_mass + float(tables.fitted.masses[1].sum()))
 
     def assemble(steps: Steps) -> StructureModel:
-        body = make_body(comm, pieces, tables, steps.mass_factors[0], ForceOptions(request.kinematics, steps.plan.step))
+        body = make_body(
+            comm, rank_elements, tables, steps.mass_factors[0], ForceOptions(request.kinematics, steps.plan.step)
+        )
         return Model(tables, with_attachments(body, *tables.fitted.masses, beddings))
 
     model = assemble(steps)
@@ -87,27 +96,27 @@ def read_structure(comm: MPI.Comm, request: StructureInput) -> tuple[MeshData | 
     def read() -> tuple[MeshData, StructureTables] | None:
         if comm.rank:
             return None
-        whole = tied(read_mesh(request.mesh), request)
+        whole = tie_layers(read_mesh(request.mesh), request)
         return whole.mesh, structure_tables(whole, request)
 
     structure = agreed(comm, read)
     return (structure[0] if structure else None), comm.bcast(structure[1] if structure else None)
 
 
-def choose_steps(comm: MPI.Comm, pieces: Pieces, request: StructureInput, pulses: list[float]) -> Steps:
+def choose_steps(comm: MPI.Comm, rank_elements: RankElements, request: StructureInput, pulses: list[float]) -> Steps:
     """Choose the time steps of the run's solver; collective."""
     if request.implicit:
-        return implicit_steps(comm, pieces, request.dynamics, pulses)
-    return explicit_steps(comm, pieces, request.dynamics)
+        return implicit_steps(comm, rank_elements, request.dynamics, pulses)
+    return explicit_steps(comm, rank_elements, request.dynamics)
 
 
-def divided_structure(world: MPI.Comm, request: StructureInput) -> DividedModels[StructureTables]:
+def divide_structure(world: MPI.Comm, request: StructureInput) -> DividedModels[StructureTables]:
     """Read, check and divide the mesh of a structure on rank 0, and broadcast the result; collective.
 
     Raises:
         AgreedError: The mesh does not fit the input or cannot be divided; on every rank.
     """
-    return divided_on_root(world, lambda: divided_on_one_rank(request))
+    return divide_on_root(world, lambda: divide_on_one_rank(request))
 
 
 def build_coupled(
@@ -116,19 +125,19 @@ def build_coupled(
     request: StructureInput,
     ranks: Mapping[Role, NDArray[np.int32]],
 ) -> dict[Role, StructureModel]:
-    """Distribute and assemble the coupled models of this rank; ``ranks`` as ``distributed``; collective."""
-    pieces = distributed(comms, divided, ranks, request)
-    bodies = assembled(comms, divided, pieces, request.kinematics)
+    """Distribute and assemble the coupled models of this rank; ``ranks`` as ``distribute_models``; collective."""
+    rank_elements = distribute_models(comms, divided, ranks, request)
+    bodies = assemble_bodies(comms, divided, rank_elements, request.kinematics)
     return {role: Model(divided.tables[role], body) for role, body in bodies.items()}
 
 
-def divided_on_one_rank(request: StructureInput) -> DividedModels[StructureTables]:
+def divide_on_one_rank(request: StructureInput) -> DividedModels[StructureTables]:
     """Read, check and divide the mesh of a structure; raises as ``structure_tables`` and ``division.checks``."""
     coupling, dynamics = request.dynamics.coupling, request.dynamics
     assert coupling is not None
-    whole = tied(read_mesh(request.mesh), request)
+    whole = tie_layers(read_mesh(request.mesh), request)
     elements = survey(whole.mesh, request.part_materials, treatment_of(request))
-    fine = chosen_fine_layers(whole, elements, coupling)
+    fine = choose_fine_layers(whole, elements, coupling)
     rules = Rules(
         coupling=coupling,
         coarse=whole.mesh.in_parts(lambda name: name not in fine),
@@ -185,7 +194,7 @@ def check_motions_at_interface(division: Division, tables: StructureTables, requ
                 )
 
 
-def chosen_fine_layers(whole: Whole, elements: Survey, coupling: LayerCoupling) -> tuple[str, ...]:
+def choose_fine_layers(whole: Whole, elements: Survey, coupling: LayerCoupling) -> tuple[str, ...]:
     """Return the fine layers: the ones named in the input or, without names, the ones with small critical steps.
 
     Raises:

@@ -191,7 +191,7 @@ class Statics:
     def _solution(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the displacement of the elastic body under nodal forces, shape (n, 3) [N]."""
         right, solution = self._vectors
-        right.array = force[self._equations.own]
+        right.array = force[self._equations.owned]
         self._factor.solve(right, solution)
         displacement = np.empty_like(force)
         self._equations.spread(solution, displacement)
@@ -199,5 +199,5 @@ class Statics:
 
     def _dot(self, first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
         """Return the scalar product over the free components of all ranks."""
-        own = self._equations.own
-        return float(self._comm.allreduce(float(first[own] @ second[own])))
+        owned = self._equations.owned
+        return float(self._comm.allreduce(float(first[owned] @ second[owned])))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.elements.element import CHUNK, Elements
 from reflowshock.fem.elements.kind import strain_matrix
-from reflowshock.fem.elements.one_point import hourglass_control, transformed
+from reflowshock.fem.elements.one_point import hourglass_control, transform_modes
 from reflowshock.fem.errors import MeshError, ModesError
 from reflowshock.fem.forces.force_assembled import AssembledElements, upper_pattern
 from reflowshock.fem.kernels.force import assemble_upper_blocks
@@ -140,7 +140,7 @@ class HenckyElements:
         along = np.where(share < 1.0, share / np.where(energy > 0.0, 2.0 * energy, 1.0), 0.0)[:, None, None]
         stiffness = share[:, None, None] * stiffness - along * elastic[:, :, None] * elastic[:, None]
         points = Points(state.points[:, :, :6], state.points[:, :, 6], share[:, None] * amplitude, share**2 * energy)
-        tangent = state.tangent + transformed(gamma, stiffness)
+        tangent = state.tangent + transform_modes(gamma, stiffness)
         return ElementResponse(points, state.force + nodal.reshape(count, 24), tangent)
 
     def _share(self, points: NDArray[np.float64], density: NDArray[np.float64]) -> NDArray[np.float64]:

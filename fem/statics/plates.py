@@ -10,7 +10,7 @@ from reflowshock.fem.elements.mesh_elements import elements_of
 from reflowshock.fem.mesh.mesh_file import read_mesh
 from reflowshock.fem.statics.pads import pad_matrix
 from reflowshock.fem.statics.state import Assembly, HeatedState, RigidModes, check_loads
-from reflowshock.fem.statics.thermal_tables import connected, die_corners, thermal_tables
+from reflowshock.fem.statics.thermal_tables import connect_board, find_die_corners, thermal_tables
 from reflowshock.materials.roles import materials_of_parts
 
 
@@ -29,7 +29,7 @@ class RigidPlates:
         Raises:
             MeshError: The mesh does not fit the pads or the materials.
         """
-        mesh = connected(read_mesh(assembly.mesh))
+        mesh = connect_board(read_mesh(assembly.mesh))
         tables = thermal_tables(mesh, assembly.pads.centres[:, 1].mean(axis=0))
         _, materials = materials_of_parts(mesh.part_names, assembly.materials)
         elements = elements_of(mesh.points, mesh.cells, mesh.part, materials)
@@ -39,7 +39,7 @@ class RigidPlates:
         self._moved = assembly.thermal.package == "moved"
         motions = tables.motions[1]
         fields = motions.fields(mesh.points) * tables.package[:, None]
-        corners = die_corners(mesh) if self._moved else np.empty(0, np.intp)
+        corners = find_die_corners(mesh) if self._moved else np.empty(0, np.intp)
         at_corners = fields[:, corners, 2]
         held = np.abs(at_corners).max(axis=1, initial=0.0) > 0.0
         weight = -assembly.gravity * fields[:, :, 2] @ mass

@@ -23,7 +23,7 @@ from reflowshock.fem.model.factorisation import FactorCost
 from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.statics.pads import pad_matrix
 from reflowshock.fem.statics.state import Assembly, HeatedState, RigidModes, check_loads
-from reflowshock.fem.statics.thermal_tables import ThermalTables, connected, die_corners, thermal_tables
+from reflowshock.fem.statics.thermal_tables import ThermalTables, connect_board, find_die_corners, thermal_tables
 from reflowshock.fem.statics.thermoelastic import Thermoelastic
 
 
@@ -154,7 +154,7 @@ class ThermalStructure:
         Raises:
             AgreedError: The mesh does not fit the pads or the materials, or memory ran out; on every rank.
         """
-        mesh = agreed(comm, lambda: connected(read_mesh(assembly.mesh)) if comm.rank == 0 else None)
+        mesh = agreed(comm, lambda: connect_board(read_mesh(assembly.mesh)) if comm.rank == 0 else None)
         placed = agreed(comm, lambda: tabulate(mesh, assembly) if mesh else None)
         return cls(comm, comm.bcast(placed), mesh, assembly)
 
@@ -226,5 +226,5 @@ def tabulate(mesh: MeshData, assembly: Assembly) -> PlacedPads:
         MeshError: Board, package, die or a pad side is missing, or a pad extends beyond its side.
     """
     centre = assembly.pads.centres[:, 1].mean(axis=0)
-    corners = die_corners(mesh) if assembly.thermal.package == "moved" else np.empty(0, np.intp)
+    corners = find_die_corners(mesh) if assembly.thermal.package == "moved" else np.empty(0, np.intp)
     return PlacedPads(mesh.points, thermal_tables(mesh, centre), pad_matrix(mesh, assembly.pads), corners)

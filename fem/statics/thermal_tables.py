@@ -83,7 +83,7 @@ class ThermalTables(Tables):
     motions: tuple[RigidMotions, RigidMotions]
 
 
-def connected(mesh: MeshData) -> MeshData:
+def connect_board(mesh: MeshData) -> MeshData:
     """Return the mesh with the nodes of board and board patch merged."""
     macro, meso = find_interface(mesh)
     return merge_nodes(mesh, meso, macro)[0]
@@ -102,9 +102,9 @@ def thermal_tables(mesh: MeshData, centre: NDArray[np.float64]) -> ThermalTables
     Raises:
         MeshError: Board or package is missing, or they share nodes.
     """
-    package = package_nodes(mesh)
+    package = find_package_nodes(mesh)
     held = held_components(mesh, SYMMETRY)
-    held[resting_nodes(mesh), 2] = True
+    held[find_resting_nodes(mesh), 2] = True
     motions = []
     for nodes in (np.flatnonzero(~package), np.flatnonzero(package)):
         points = mesh.points[nodes]
@@ -116,7 +116,7 @@ def thermal_tables(mesh: MeshData, centre: NDArray[np.float64]) -> ThermalTables
     return ThermalTables.undivided(whole, held, package=package, motions=(motions[0], motions[1]))
 
 
-def package_nodes(mesh: MeshData) -> NDArray[np.bool_]:
+def find_package_nodes(mesh: MeshData) -> NDArray[np.bool_]:
     """Return whether a node belongs to the package, shape (n,); raises as ``thermal_tables``."""
     of_board = mesh.in_parts(BOARD_PARTS.__contains__)
     if of_board.all() or not of_board.any():
@@ -129,8 +129,8 @@ def package_nodes(mesh: MeshData) -> NDArray[np.bool_]:
     return package
 
 
-def resting_nodes(mesh: MeshData) -> NDArray[np.intp]:
-    """Return one node at the lower end of each mounting hole, the nearest to the centre of the board."""
+def find_resting_nodes(mesh: MeshData) -> NDArray[np.intp]:
+    """Return one node at the lower end of each mounting hole, the nearest to the centre of the board, shape (k,)."""
     nodes = mesh.facet_nodes("mounting_holes")
     if not len(nodes):
         return nodes.astype(np.intp)
@@ -141,8 +141,8 @@ def resting_nodes(mesh: MeshData) -> NDArray[np.intp]:
     return np.array([low[quadrant == q][np.argmin(distance[quadrant == q])] for q in np.unique(quadrant)])
 
 
-def die_corners(mesh: MeshData) -> NDArray[np.intp]:
-    """Return the nodes at the upper die corners that no symmetry plane removes, one in a quarter model.
+def find_die_corners(mesh: MeshData) -> NDArray[np.intp]:
+    """Return the nodes at the upper die corners that no symmetry plane removes, shape (k,); one in a quarter model.
 
     Raises:
         MeshError: The mesh has no die.

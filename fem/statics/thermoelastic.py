@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.elements.stress import symmetric
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.model.assembly import make_body, make_pieces
+from reflowshock.fem.model.assembly import make_body, make_rank_elements
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.factorisation import FactorCost, Factorisation
 from reflowshock.fem.model.global_matrix import Equations
@@ -67,12 +67,12 @@ class RigidSpace:
         return np.asarray(self.comm.allreduce(np.einsum("kni,ni->k", self.fields[:, owned], force[owned])))
 
     def balance(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return nodal forces plus the inertia forces that balance them."""
+        """Return nodal forces plus the inertia forces that balance them, shape (n, 3) [N]; collective."""
         acceleration = np.tensordot(self.inverse @ self.work(force), self.fields, 1)
         return force - self.mass[:, None] * acceleration
 
     def still(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return a displacement without its rigid-body part."""
+        """Return a displacement without its rigid-body part, shape (n, 3) [m]; collective."""
         momentum = self.work(self.mass[:, None] * displacement)
         return displacement - np.tensordot(self.inverse @ momentum, self.fields, 1)
 
@@ -93,8 +93,8 @@ class Thermoelastic:
             AgreedError: A rank has no elements, the matrix is not positive definite, or memory ran out; on every rank.
         """
         local = distribute(comm, mesh)
-        pieces = agreed(comm, lambda: make_pieces(local, tables, materials))
-        self.body = make_body(comm, pieces, tables, np.ones(len(pieces.steps)), None)
+        rank_elements = agreed(comm, lambda: make_rank_elements(local, tables, materials))
+        self.body = make_body(comm, rank_elements, tables, np.ones(len(rank_elements.steps)), None)
         self.space = RigidSpace.of(comm, self.body, tables)
         _, assigned = materials_of_parts(tables.part_names, materials)
         self.expansion = expansion_force(self.body, np.array([material.expansion for material in assigned]))
@@ -119,7 +119,7 @@ class Thermoelastic:
 
     def displacement(self, force: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the displacement, shape (n, 3) [m], under nodal forces, shape (n, 3) [N]; collective."""
-        self._right.array = self.space.balance(force)[self._equations.own]
+        self._right.array = self.space.balance(force)[self._equations.owned]
         self._factor.solve(self._right, self._solution)
         result = np.empty_like(force)
         self._equations.spread(self._solution, result)

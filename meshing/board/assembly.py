@@ -127,7 +127,18 @@ def write_heated_assembly(package: Package, board: Board, path: Path) -> dict[st
 
     A shock needs up to a hundred thousand board elements to resolve waves; a reflow only needs the motion of the pads.
     With two layers, and coarse cells away from the package, the gaps of hu_bga_drop differ by a tenth of a nanometre
-    from those of its board for the shock (0.5 mm everywhere, six layers), with a twentieth of the equations.
+    from the gaps with its board for the shock (0.5 mm everywhere, six layers), with a twentieth of the equations.
+
+    Args:
+        package: Array, pads and layers of the package.
+        board: Board as for the shock; its numbers of layers and coarse cells are replaced.
+        path: The ``.msh`` file to write.
+
+    Returns:
+        Part name -> number of hexahedra.
+
+    Raises:
+        ValueError: An element is inverted.
     """
     coarse = max(board.numerics.coarse_size, COARSE * board.thickness)
     numerics = board.numerics.model_copy(update={"layers": 2, "patch_layers": 1, "coarse_size": coarse})

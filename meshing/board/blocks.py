@@ -36,7 +36,7 @@ def plan_surfaces(plan: Plan, height: float, hole: RoundHole | None = None, reco
 
     Args:
         plan: Plan of board, package or box.
-        height: z coordinate of the surfaces [m].
+        height: Coordinate z of the surfaces [m].
         hole: Round hole in the blocks ``plan.holes``.
         recombine: Whether surfaces are meshed by quadrilaterals instead of triangles.
 
@@ -68,16 +68,16 @@ def plan_surfaces(plan: Plan, height: float, hole: RoundHole | None = None, reco
 
 
 def extrude(surfaces: Surfaces, thickness: float, elements: int, recombine: bool = True) -> tuple[Surfaces, Surfaces]:
-    """Extrude surfaces upwards.
+    """Extrude surfaces of the current Gmsh model upwards, along z.
 
     Args:
-        surfaces: Block -> surface tags.
+        surfaces: Block (i, j) -> surface tags.
         thickness: Thickness of the extrusion [m].
         elements: Number of element layers.
         recombine: Whether volumes are meshed by hexahedra instead of tetrahedra.
 
     Returns:
-        Tags of the volumes and of the upper surfaces, by block.
+        Block (i, j) -> volume tags, and block (i, j) -> tags of the upper surfaces, in the order of the given tags.
     """
     volumes: Surfaces = {}
     tops: Surfaces = {}
@@ -102,11 +102,11 @@ def _line(start: int, end: int, part: Interval) -> int:
 
 
 def lies_within_hole(surface: int, centres: Iterable[tuple[float, float]], diameter: float) -> bool:
-    """Return whether a Gmsh surface lies within the bounding square of a hole.
+    """Return whether a surface of the current Gmsh model lies within the bounding square of one of the holes, in plan.
 
     Args:
-        surface: Tag of the surface.
-        centres: Centres of the holes in plan [m].
+        surface: Gmsh tag of the surface.
+        centres: Centres (x, y) of the holes in plan [m].
         diameter: Diameter of the holes [m].
     """
     x0, y0, _, x1, y1, _ = (value * MILLI for value in gmsh.model.getBoundingBox(2, surface))
@@ -127,7 +127,7 @@ def check_elements(name: str) -> None:
 
 
 def count_elements(volumes: Iterable[int]) -> int:
-    """Return the number of elements in Gmsh volumes."""
+    """Return the number of three-dimensional elements in volumes of the current Gmsh model, given by their tags."""
     return sum(len(tags) for volume in volumes for tags in gmsh.model.mesh.getElements(3, volume)[1])
 
 

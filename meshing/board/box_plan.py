@@ -27,7 +27,7 @@ class BoxLayer:
         name: Name of the layer.
         thickness: Thickness [m].
         cells: Number of elements through the thickness.
-        in_plane: Number of elements along x and y, if they differ from those of the box.
+        in_plane: Number of elements along x and y, if they differ from the box.
     """
 
     name: str
@@ -114,7 +114,11 @@ def box_plan(box: Box) -> Plan:
 
 
 def count_box(box: Box) -> dict[str, PartEstimate]:
-    """Count the elements of every layer exactly, and estimate the edge lengths of the smallest element."""
+    """Count the elements of every layer exactly, and estimate the edge lengths of the smallest element.
+
+    Returns:
+        Layer name -> number and sizes of its elements.
+    """
     return {name: part for stack in box.stacks for name, part in _count_stack(stack).items()}
 
 

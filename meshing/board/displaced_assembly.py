@@ -34,11 +34,12 @@ def write_displaced_assembly(source: Path, displacement: Displacement, path: Pat
 
     Args:
         source: The ``.msh`` file of the flat assembly.
-        displacement: Displacement of the package relative to the board.
+        displacement: Function of node positions of the package, shape (k, 3) [m], that returns their displacements
+            relative to the board, shape (k, 3) [m].
         path: The ``.msh`` file to write.
 
     Returns:
-        Underside of the displaced package.
+        Underside of the displaced package, as a height field above the board's top face.
 
     Raises:
         ContactError: The package would touch the board.
@@ -74,7 +75,12 @@ def _check_room(underside: np.ndarray) -> None:
 
 
 def prescribed_displacement(package: Package, warpage: Warpage) -> Displacement:
-    """Return the displacement of a package with prescribed warpage."""
+    """Return the displacement field of a package with prescribed warpage.
+
+    Returns:
+        Function of undisplaced points of the package, shape (k, 3) [m], that returns their displacements relative to
+        the board, shape (k, 3) [m].
+    """
 
     def displacement(points: np.ndarray) -> np.ndarray:
         height = lift(package, warpage, points[:, 0], points[:, 1])
@@ -84,12 +90,27 @@ def prescribed_displacement(package: Package, warpage: Warpage) -> Displacement:
 
 
 def uniform_lift(height: float) -> Displacement:
-    """Return the displacement of a flat package that lies a height [m] above its drawn position."""
+    """Return the displacement field of a flat package that lies a height [m] above its drawn position.
+
+    Returns:
+        Function of points, shape (k, 3) [m], that returns their displacements, shape (k, 3) [m].
+    """
     return lambda points: np.broadcast_to([0.0, 0.0, height], points.shape)
 
 
 def read_displacement(path: Path) -> Displacement:
-    """Read the displacement that a reflow wrote to ``structure.npz``; errors as in ``computed_displacement``."""
+    """Read the displacement field of the package that a reflow wrote.
+
+    Args:
+        path: NPZ file, ``structure.npz`` of a reflow, with the arrays ``points`` and ``displacement``, shape (n, 3)
+            [m], and ``package``, shape (n,); see ``computed_displacement``.
+
+    Returns:
+        Function of points of the package, shape (k, 3) [m], as ``computed_displacement`` returns it.
+
+    Raises:
+        NotStructuredError: The nodes of the board's top face under the package do not form a grid.
+    """
     with np.load(path) as arrays:
         return computed_displacement(arrays["points"], arrays["displacement"], arrays["package"])
 
@@ -101,6 +122,10 @@ def computed_displacement(points: np.ndarray, displacement: np.ndarray, is_packa
         points: Reference positions of the nodes of package and board, shape (n, 3) [m].
         displacement: Displacements of these nodes, shape (n, 3) [m].
         is_package: Whether each node belongs to the package, shape (n,).
+
+    Returns:
+        Function of points at nodes of the package, shape (k, 3) [m], that returns their displacements, shape (k, 3)
+        [m]; it raises DisplacementError for a point without a node.
 
     Raises:
         NotStructuredError: The nodes of the board's top face under the package do not form a grid.

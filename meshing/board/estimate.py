@@ -59,6 +59,9 @@ def count_elements(
         board: Sizes, holes and symmetry of the board.
         warpage: Prescribed warpage of the package.
         fine: Number of joints with a fine mesh; the others are coarse (``solder_coarse``). None: all are fine.
+
+    Returns:
+        Part name -> number and sizes of its elements; parts without elements are omitted.
     """
     joints = pad_table(package, board, warpage)
     count = len(joints) if fine is None else fine
@@ -153,7 +156,7 @@ def _joint_estimates(package: Package, joints: int, gap: float) -> dict[str, Par
 def _column_estimates(
     package: Package, board: Board, parts: dict[str, PartEstimate], joints: int
 ) -> dict[str, PartEstimate]:
-    """Count the elements of the columns of fine joints, and those of the remaining boxes."""
+    """Count the elements of the columns of fine joints, and the remaining boxes."""
     imprint, numerics = package.imprint, package.joint_numerics
     if imprint is None or package.column_size is None:
         return {}
@@ -205,7 +208,12 @@ def _section(numerics: JointNumerics) -> int:
 
 
 def element_edge(package: Package, numerics: JointNumerics) -> float:
-    """Return the typical edge length in the cross-section of a joint [m]."""
+    """Return the typical edge length in the cross-section of a joint [m].
+
+    Args:
+        package: Package, whose smaller wetted radius counts.
+        numerics: Resolution of the section: elements of the core and rings around it.
+    """
     wetted = min(pad.wetted_radius for pad in (package.board_pad, package.package_pad))
     return wetted / (0.5 * numerics.core + numerics.rings)
 

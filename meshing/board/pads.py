@@ -26,8 +26,8 @@ class PadSite:
         name: JEDEC name.
         row: Row, counted from 0.
         column: Column, counted from 0.
-        x: x coordinate of the centre of the pad on the board [m].
-        y: y coordinate of the centre of the pad on the board [m].
+        x: Coordinate x of the centre of the pad on the board [m].
+        y: Coordinate y of the centre of the pad on the board [m].
         gap: Height between the centres of both pads, copper to copper [m].
         wetted_radius_board: Radius that solder can wet on the board [m].
         wetted_radius_package: Radius that solder can wet on the package [m].
@@ -77,6 +77,9 @@ def pad_table(package: Package, board: Board, warpage: Warpage) -> list[PadSite]
         package: Array, pads and standoff of the package.
         board: Board; of a quarter model only joints at x > 0 and y > 0 are listed.
         warpage: Prescribed warpage of the package, which changes each gap and tilts the upper pads.
+
+    Returns:
+        Name, position, sizes, gap and tilt of each joint; depopulated joints are omitted.
     """
     corner = corner_axis(package)
     sites = []
@@ -88,11 +91,17 @@ def pad_table(package: Package, board: Board, warpage: Warpage) -> list[PadSite]
             if name in package.depopulated or (board.symmetry == "quarter" and (x < 0 or y < 0)):
                 continue
             sites.append(PadSite(name, row, column, x, y, package.standoff, *_pad_sizes(package)))
-    return lifted(sites, package, warpage)
+    return lift_pads(sites, package, warpage)
 
 
-def lifted(sites: Iterable[PadSite], package: Package, warpage: Warpage) -> list[PadSite]:
-    """Return the sites of undeformed joints with the gaps and tilts under a warpage of the package."""
+def lift_pads(sites: Iterable[PadSite], package: Package, warpage: Warpage) -> list[PadSite]:
+    """Return copies of pad sites with the gaps and tilts under a warpage of the package.
+
+    Args:
+        sites: Sites of undeformed joints; the warpage is added to their gaps and replaces their tilts.
+        package: Package, whose outermost joints define the warpage.
+        warpage: Prescribed warpage.
+    """
     return [
         replace(
             site,
@@ -130,7 +139,17 @@ def has_rim(pad_radius: float, wetted_radius: float) -> bool:
 
 
 def lift(package: Package, warpage: Warpage, x: Length, y: Length) -> Length:
-    """Return the lift of the package by warpage at (x, y), scalars or arrays [m]; 0 for a single joint."""
+    """Return the lift of the package by warpage at (x, y), upwards positive; 0 for a single joint.
+
+    Args:
+        package: Package, whose outermost joints define the warpage.
+        warpage: Prescribed warpage.
+        x: First coordinate in plan, a scalar or an array [m].
+        y: Second coordinate in plan, shaped as ``x`` [m].
+
+    Returns:
+        Lift, shaped as ``x`` [m].
+    """
     corner_x, corner_y = corner_axis(package)
     if corner_x == corner_y == 0.0:
         return 0.0 * x
@@ -138,12 +157,12 @@ def lift(package: Package, warpage: Warpage, x: Length, y: Length) -> Length:
 
 
 def write_pads(path: Path, sites: Iterable[PadSite]) -> None:
-    """Write the pad table as JSON."""
+    """Write pad sites as a JSON list with one object of all fields for each site, in SI units."""
     path.write_text(json.dumps([asdict(site) for site in sites], indent=1) + "\n", encoding="utf-8")
 
 
 def read_pads(path: Path) -> list[PadSite]:
-    """Read a pad table written by ``write_pads``."""
+    """Read the pad sites that ``write_pads`` wrote, in the order of the file."""
     pairs = ("offset", "tilt")
     return [
         PadSite(**record | {key: tuple(record[key]) for key in pairs})

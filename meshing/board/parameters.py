@@ -1,6 +1,6 @@
 """Parameters of the geometry: array, pads, package, board, warpage.
 
-All values are SI floats; ``Quantity`` holds the unit that is shown to users.
+All values are SI floats; ``Quantity`` names the unit that case files and messages use.
 """
 
 from typing import Annotated, Literal
@@ -15,7 +15,7 @@ IN_LINE = 1.0e-9  # m: holes whose coordinates along an axis differ by less are 
 
 
 class Pad(Parameters):
-    """A circular copper pad and the opening of the solder mask above it.
+    """Circular copper pad and the opening of the solder mask above it.
 
     SMD (solder mask defined): the opening is smaller than the pad and limits the solder.
     NSMD: the opening is larger, the edge of the copper limits the solder.
@@ -39,7 +39,7 @@ class Copper(Parameters):
 
 
 class Layer(Parameters):
-    """A rectangular, centred layer of the package: substrate or die."""
+    """Rectangular, centred layer of the package: substrate or die."""
 
     length: Length = Field(gt=0)
     width: Length = Field(gt=0)

@@ -80,7 +80,16 @@ def board_plan(package: Package, board: Board) -> Plan:
 def blocks_at(
     centres: Iterable[tuple[float, float]], x: tuple[Interval, ...], y: tuple[Interval, ...]
 ) -> frozenset[tuple[int, int]]:
-    """Return the blocks (i, j) whose centres are among the given points [m]; points outside the mesh are ignored."""
+    """Return the blocks whose centres are among given points; points outside the mesh are ignored.
+
+    Args:
+        centres: Points (x, y) [m].
+        x: Intervals along x.
+        y: Intervals along y.
+
+    Returns:
+        Indices (i, j) of the blocks: interval i along x and interval j along y.
+    """
     columns, rows = ([0.5 * (part.start + part.end) for part in axis] for axis in (x, y))
     return frozenset(
         (i, j)
@@ -91,13 +100,20 @@ def blocks_at(
 
 
 def package_plan(package: Package, board: Board) -> Plan:
-    """Divide the package so that the edges of the die lie on grid lines."""
+    """Divide the package into intervals along x and y, with the edges of the die on grid lines.
+
+    With a quarter model of the board only the positive halves are returned. The plan has no holes.
+    """
     x, y = package_axes(package)
     return Plan(x, y) if board.symmetry == "quarter" else Plan(_both_sides(x, x), _both_sides(y, y))
 
 
 def package_axes(package: Package) -> tuple[tuple[Interval, ...], tuple[Interval, ...]]:
-    """Divide the positive halves of the package's axes at the edges of the die, if it is smaller than the substrate."""
+    """Divide the positive halves of the package's axes at the edges of the die, if it is smaller than the substrate.
+
+    Returns:
+        Intervals with graded cells along x and along y, from the centre to the edge of the substrate.
+    """
     size, die, substrate = package.numerics.element_size, package.die, package.substrate
     edges = (
         _distinct(0.5 * die.length, 0.5 * substrate.length),
@@ -117,17 +133,28 @@ def hole_square(board: Board) -> float:
 
 
 def square_around(diameter: float, inset: float) -> float:
-    """Return the side of the square around a hole [m]: twice the diameter, or less if the edge is near."""
+    """Return the side of the square around a hole [m]: twice the diameter, or less if the edge is near.
+
+    Args:
+        diameter: Diameter of the hole [m].
+        inset: Distance from the centre of the hole to the nearest edge [m].
+    """
     return min(2.0 * diameter, WIDEST_SQUARE * inset)
 
 
 def uniform(start: float, end: float, size: float) -> Interval:
-    """Return an interval of equal cells with a length as close to ``size`` [m] as possible."""
+    """Return an interval of an axis with equal cells.
+
+    Args:
+        start: Start of the interval [m].
+        end: End of the interval [m].
+        size: Target length of a cell [m]; the number of cells is rounded and at least one.
+    """
     return Interval(start, end, max(1, round((end - start) / size)))
 
 
 def hole_rings(board: Board) -> int:
-    """Return the number of cells between a mounting hole and the edge of its square."""
+    """Return the number of cells, in radial direction, between a mounting hole and the edge of its square."""
     ring = 0.5 * (hole_square(board) - board.holes.diameter)
     return max(1, round(ring / board.numerics.coarse_size))
 
@@ -154,7 +181,16 @@ def column_levels(thickness: float, boxes: int, imprint: Imprint) -> np.ndarray:
 
 
 def blocks_within(plan: Plan, length: float, width: float) -> set[tuple[int, int]]:
-    """Return the blocks (i, j) of a plan inside a centred rectangle of a length and width [m]."""
+    """Return the blocks of a plan that lie inside a rectangle centred at the origin.
+
+    Args:
+        plan: Intervals along x and y.
+        length: Size of the rectangle along x [m].
+        width: Size of the rectangle along y [m].
+
+    Returns:
+        Indices (i, j) of the blocks along x and y.
+    """
     columns = _within(plan.x, 0.5 * length)
     rows = _within(plan.y, 0.5 * width)
     return {(i, j) for i in columns for j in rows}

@@ -4,7 +4,14 @@ import numpy as np
 
 
 def pieces(facets: np.ndarray) -> list[np.ndarray]:
-    """Return row numbers of the pieces of facets (f, m) that are connected by edges, largest piece first."""
+    """Return the row numbers of each piece of facets that is connected by edges.
+
+    Args:
+        facets: Node numbers of triangles or quadrilaterals, shape (f, m).
+
+    Returns:
+        Row numbers of the facets of each piece, shape (k,), the piece with most facets first.
+    """
     ends = np.sort(np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     edges = np.unique(ends, axis=0, return_inverse=True)[1].reshape(facets.shape)
     label = np.arange(int(edges.max()) + 1)
@@ -19,12 +26,20 @@ def pieces(facets: np.ndarray) -> list[np.ndarray]:
 
 
 def outlines(facets: np.ndarray) -> list[np.ndarray]:
-    """Return the closed outlines of facets (f, m) as node numbers in the direction of the facets, longest first."""
+    """Return the closed outlines of facets: the loops of edges that belong to one facet only.
+
+    Args:
+        facets: Node numbers of consistently oriented triangles or quadrilaterals, shape (f, m).
+
+    Returns:
+        Node numbers of each outline in the direction of the facets, shape (k,), the first node not repeated; the
+        outline with most nodes first.
+    """
     first, second = facets.ravel(), np.roll(facets, -1, axis=1).ravel()
     count = int(facets.max()) + 1
     forward, backward = first * np.int64(count) + second, second * np.int64(count) + first
-    alone = ~np.isin(forward, backward)
-    following = dict(zip(first[alone].tolist(), second[alone].tolist(), strict=True))
+    unpaired = ~np.isin(forward, backward)
+    following = dict(zip(first[unpaired].tolist(), second[unpaired].tolist(), strict=True))
     lines = []
     while following:
         line = [next(iter(following))]
@@ -106,7 +121,16 @@ def _crossing(points: np.ndarray, first: np.ndarray, second: np.ndarray, height:
 
 
 def nearest_on_triangles(points: np.ndarray, triangles: np.ndarray, queries: np.ndarray) -> np.ndarray:
-    """Return the point on triangles (t, 3) that is nearest to each query point (q, 3), shape (q, 3) [m]."""
+    """Return the nearest point on triangles to each query point.
+
+    Args:
+        points: Vertices, shape (n, 3) [m].
+        triangles: Triangles, shape (t, 3).
+        queries: Query points, shape (q, 3) [m].
+
+    Returns:
+        Nearest points, shape (q, 3) [m].
+    """
     import pyvista
 
     surface = pyvista.PolyData.from_regular_faces(points, triangles)
@@ -114,7 +138,15 @@ def nearest_on_triangles(points: np.ndarray, triangles: np.ndarray, queries: np.
 
 
 def nearest_on_line(line: np.ndarray, queries: np.ndarray) -> np.ndarray:
-    """Return the point on a closed polygon (k, 3) that is nearest to each query point (q, 3), shape (q, 3) [m]."""
+    """Return the nearest point on a closed polygon to each query point.
+
+    Args:
+        line: Vertices of the polygon in order, the first not repeated, shape (k, 3) [m].
+        queries: Query points, shape (q, 3) [m].
+
+    Returns:
+        Nearest points, shape (q, 3) [m].
+    """
     along = np.roll(line, -1, axis=0) - line
     share = np.einsum("qki,ki->qk", queries[:, None] - line, along) / np.einsum("ki,ki->k", along, along)
     candidates = line + np.clip(share, 0.0, 1.0)[..., None] * along

@@ -11,7 +11,7 @@ import numpy as np
 TARGET_JACOBIAN = 0.35  # corners with a smaller scaled Jacobian contribute to the objective
 ACTIVE_JACOBIAN = 0.55  # corners with a smaller scaled Jacobian are evaluated in a round
 ROUNDS, STEPS = 4, 15
-STRIDE = 0.5  # of the square of the shortest edge at a node, times the gradient
+STRIDE = 0.5  # first step of the descent, relative to the gradient times the square of a node's shortest edge
 FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
 # The three neighbours of each corner along edges, ordered so that a valid corner has a positive triple product.
 CORNER_NEIGHBOURS = np.array([[1, 3, 4], [2, 0, 5], [3, 1, 6], [0, 2, 7], [7, 5, 0], [4, 6, 1], [5, 7, 2], [6, 4, 3]])
@@ -57,7 +57,10 @@ def quad_areas(points: np.ndarray, quads: np.ndarray) -> np.ndarray:
 
 
 def boundary_quads(cells: np.ndarray) -> np.ndarray:
-    """Return the faces that belong to one cell only, counter-clockwise seen from outside, shape (f, 4)."""
+    """Return the faces that belong to one cell only, of hexahedra (c, 8), shape (f, 4).
+
+    Nodes run counter-clockwise seen from outside.
+    """
     faces = cells[:, FACES].reshape(-1, 4)
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     return faces[first[count == 1]]
@@ -97,20 +100,20 @@ def relax_hexahedra(points: np.ndarray, cells: np.ndarray, freedom: Freedom) -> 
     """
     corners = np.concatenate([cells[:, [k, *CORNER_NEIGHBOURS[k]]] for k in range(8)])
     corners = corners[freedom.free[corners].any(axis=1)]
-    reach = _reach(points, corners)
+    scale = _squared_shortest_edges(points, corners)
     for _ in range(ROUNDS):
-        points = _round(points, corners[_jacobian(points, corners) < ACTIVE_JACOBIAN], reach, freedom)
+        points = _round(points, corners[_jacobian(points, corners) < ACTIVE_JACOBIAN], scale, freedom)
     return points
 
 
-def _round(points: np.ndarray, corners: np.ndarray, reach: np.ndarray, freedom: Freedom) -> np.ndarray:
-    """Take descent steps for the active corners."""
+def _round(points: np.ndarray, corners: np.ndarray, scale: np.ndarray, freedom: Freedom) -> np.ndarray:
+    """Take descent steps for the active corners, each node scaled by its squared shortest edge (n,) [m^2]."""
     stride = STRIDE
     total, gradient = _objective(points, corners)
     for _ in range(STEPS):
         if total == 0.0:
             break
-        trial = points - stride * reach[:, None] * freedom.admitted(gradient)
+        trial = points - stride * scale[:, None] * freedom.admitted(gradient)
         after, next_gradient = _objective(trial, corners)
         if after < total:
             points, total, gradient, stride = trial, after, next_gradient, 1.3 * stride
@@ -136,16 +139,16 @@ def _objective(points: np.ndarray, corners: np.ndarray) -> tuple[float, np.ndarr
     normals = np.cross(np.roll(units, -1, axis=1), np.roll(units, -2, axis=1))
     jacobian = np.einsum("ki,ki->k", units[:, 0], normals[:, 0])
     bad = jacobian < TARGET_JACOBIAN
-    miss = (TARGET_JACOBIAN - jacobian[bad])[:, None, None]
+    shortfall = (TARGET_JACOBIAN - jacobian[bad])[:, None, None]
     pull = normals[bad] - units[bad] * jacobian[bad][:, None, None]
-    pull *= -2.0 * miss / lengths[bad]
+    pull *= -2.0 * shortfall / lengths[bad]
     at_nodes = np.concatenate([-pull.sum(axis=1, keepdims=True), pull], axis=1).reshape(-1, 3)
     nodes = corners[bad].ravel()
     gradient = np.stack([np.bincount(nodes, at_nodes[:, axis], len(points)) for axis in range(3)], axis=1)
-    return float((miss**2).sum()), gradient
+    return float((shortfall**2).sum()), gradient
 
 
-def _reach(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
+def _squared_shortest_edges(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Return the square of the shortest edge at each node, shape (n,) [m^2]."""
     shortest = np.full(len(points), np.inf)
     np.minimum.at(shortest, corners[:, 0], _units(points, corners)[1].min(axis=(1, 2)))

@@ -27,10 +27,12 @@ CORNERS_ONLY = {
 
 
 def write_preview(paths: list[Path], picture: Path) -> None:
-    """Render the hexahedra of Gmsh files, coloured by part: the whole model on the left, the package on the right.
+    """Render the hexahedra of Gmsh files as one picture, coloured by part.
+
+    The whole model is on the left, all parts except the board outside the patch are on the right.
 
     Args:
-        paths: ``.msh`` files (assembly, and joints if they exist).
+        paths: ``.msh`` files to read (assembly, and joints if they exist).
         picture: The PNG file to write.
     """
     parts = [part for path in paths for part in _parts(path)]
@@ -51,7 +53,12 @@ def write_preview(paths: list[Path], picture: Path) -> None:
 
 
 def write_layers_preview(path: Path, picture: Path) -> None:
-    """Render the elements of a Gmsh file, each physical volume in a different colour."""
+    """Render the elements of a Gmsh file as a PNG file, each physical volume in a different colour.
+
+    Args:
+        path: The ``.msh`` file to read.
+        picture: The PNG file to write.
+    """
     parts = _parts(path)
     colours = [LAYER_COLOURS[k % len(LAYER_COLOURS)] for k in range(len(parts))]
     plotter = pyvista.Plotter(off_screen=True, window_size=list(SIZE), border=False)
@@ -75,7 +82,7 @@ def _add_legend(plotter: pyvista.Plotter, entries: list[tuple[str, str]]) -> Non
 
 
 def colour(part: str) -> str:
-    """Return the colour of a part by its material role."""
+    """Return the colour of a mesh part, e.g. "solder@A1", by its material role, as a colour name or code of PyVista."""
     return COLOURS[_role(part)]
 
 

@@ -12,7 +12,7 @@ from reflowshock.meshing.core.gmsh_session import gmsh_model, name_groups, write
 from reflowshock.meshing.core.split_tetrahedra import EDGES, SplitTetrahedra
 
 KIND, FACE = 11, 9  # Gmsh's ten-node tetrahedron and six-node triangle
-ORDER = np.array([0, 3, 1, 2, 5, 4])  # Gmsh's edges 01 12 20 03 23 13 among ours, 01 02 03 12 13 23
+ORDER = np.array([0, 3, 1, 2, 5, 4])  # positions of Gmsh's edges 01 12 20 03 23 13 in ``EDGES``, 01 02 03 12 13 23
 # Exact for cubics (Keast 1986, five points): barycentric coordinates and weights of the unit tetrahedron.
 STATIONS = np.vstack([np.full(4, 0.25), np.full((4, 4), 1.0 / 6.0) + np.eye(4) / 3.0])
 WEIGHTS = np.array([-0.8, 0.45, 0.45, 0.45, 0.45]) / 6.0
@@ -38,11 +38,11 @@ class QuadraticTetrahedra:
 def quadratic_tetrahedra(
     split: SplitTetrahedra, points: np.ndarray, tetrahedra: np.ndarray, faces: dict[str, np.ndarray]
 ) -> QuadraticTetrahedra:
-    """Build ten-node tetrahedra whose surface edges are curved like those of the split hexahedra.
+    """Build ten-node tetrahedra whose surface edges are curved like the split hexahedra.
 
     Args:
         split: Hexahedra into which the tetrahedra were split.
-        points: Present node coordinates of these hexahedra, shape (n, 3) [m]; gives the midpoints of surface edges.
+        points: Smoothed node coordinates of these hexahedra, shape (n, 3) [m]; give the midpoints of surface edges.
         tetrahedra: Vertices of the tetrahedra, shape (c, 4).
         faces: Facet set name -> surface triangles, shape (f, 3).
     """
@@ -58,11 +58,15 @@ def quadratic_tetrahedra(
 
 
 def tetrahedra_quality(tetrahedra: QuadraticTetrahedra, volume: float) -> dict[str, float]:
-    """Return the number of tetrahedra, their smallest scaled Jacobian and the relative error of their volume.
+    """Return measures of the quality of tetrahedra.
 
     Args:
-        tetrahedra: Ten-node tetrahedra; the scaled Jacobian is that of the straight ones.
+        tetrahedra: Ten-node tetrahedra; the scaled Jacobian refers to straight edges.
         volume: Exact volume [m^3].
+
+    Returns:
+        ``count``, ``minimum_scaled_jacobian`` (0.707 for a regular tetrahedron), and ``volume_error``, the magnitude of
+        the relative error of the volume.
     """
     return {
         "count": len(tetrahedra.cells),
@@ -72,10 +76,17 @@ def tetrahedra_quality(tetrahedra: QuadraticTetrahedra, volume: float) -> dict[s
 
 
 def least_jacobian(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Return a lower bound of the Jacobian of ten-node tetrahedra (c, 10), relative to the straight ones, shape (c,).
+    """Return a lower bound of the Jacobian of each ten-node tetrahedron, relative to the straight one.
 
     The Jacobian is a cubic polynomial and thus not below its smallest Bernstein coefficient (Johnen, Remacle &
     Geuzaine 2013).
+
+    Args:
+        points: Node coordinates, shape (n, 3) [m].
+        cells: Nodes of the tetrahedra, shape (c, 10).
+
+    Returns:
+        Lower bounds, shape (c,); 1 for straight edges with midside nodes in the middle.
     """
     corners = points[cells]
     straight = np.linalg.det(corners[:, 1:4] - corners[:, :1])
@@ -86,7 +97,12 @@ def least_jacobian(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
 
 
 def curved_volume(points: np.ndarray, cells: np.ndarray) -> float:
-    """Return the exact volume of ten-node tetrahedra (c, 10) [m^3]."""
+    """Return the exact total volume of ten-node tetrahedra [m^3].
+
+    Args:
+        points: Node coordinates, shape (n, 3) [m].
+        cells: Four vertices and six midside nodes of each tetrahedron, shape (c, 10).
+    """
     total = 0.0
     corners = points[cells]
     for station, weight in zip(STATIONS, WEIGHTS, strict=True):
@@ -106,7 +122,13 @@ def corner_quality(points: np.ndarray, tetrahedra: np.ndarray) -> float:
 
 
 def write_tetrahedra(path: Path, name: str, tetrahedra: QuadraticTetrahedra) -> None:
-    """Write tetrahedra as MSH 4.1 in metres: the volume ``solder@name`` and its facet sets."""
+    """Write tetrahedra as MSH 4.1 in metres.
+
+    Args:
+        path: The ``.msh`` file to write.
+        name: Name of the joint; the volume is called ``solder@name``.
+        tetrahedra: Ten-node tetrahedra with their facet sets, which are written, too.
+    """
     with gmsh_model("free form"):
         first = 1
         groups = [(3, KIND, f"solder@{name}", tetrahedra.cells)]

@@ -43,7 +43,15 @@ class SplitTetrahedra:
 
 
 def split_tetrahedra(points: np.ndarray, tetrahedra: np.ndarray) -> SplitTetrahedra:
-    """Split positively oriented tetrahedra (c, 4) into four hexahedra each, one at each vertex."""
+    """Split positively oriented tetrahedra into four hexahedra each, one at each vertex.
+
+    Args:
+        points: Vertices, shape (n, 3) [m].
+        tetrahedra: Vertices of the tetrahedra, shape (c, 4).
+
+    Returns:
+        Nodes, the n vertices first, and hexahedra, with lookups of the midpoints of edges and faces.
+    """
     count = len(points)
     edges, edge = np.unique(_keys(tetrahedra[:, EDGES], count), return_inverse=True)
     faces, face = np.unique(_keys(tetrahedra[:, FACES], count), return_inverse=True)

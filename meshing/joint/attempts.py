@@ -24,7 +24,7 @@ from reflowshock.meshing.joint.free_form import free_form_solder
 from reflowshock.meshing.joint.joint_mesh import JointMesh, JointMeshError, check_errors
 from reflowshock.meshing.joint.solder import Solder
 from reflowshock.meshing.joint.swept import Placing, swept_solder
-from reflowshock.meshing.joint.tetrahedra import fill_apart
+from reflowshock.meshing.joint.tetrahedra import fill_in_process
 from reflowshock.meshing.surface.closed_surface import (
     BOARD_PAD,
     PACKAGE_PAD,
@@ -36,8 +36,8 @@ from reflowshock.meshing.surface.closed_surface import (
 )
 
 MOST_LAYERS = 64
-FREE_FORM_SIZES = (1.0, 0.75, 1.25)  # of two layers: split in two, an edge is as long as a layer is high
-LARGEST_DEVIATION = 0.1  # of the equal-volume sphere's radius, in addition to that of the section's polygon
+FREE_FORM_SIZES = (1.0, 0.75, 1.25)  # edge length over two layer heights, since the split halves each edge
+LARGEST_DEVIATION = 0.1  # of the radius of a sphere of equal volume; the polygon of a swept section adds its own
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,16 @@ class Attempt:
 
 
 def attempts(surface: ClosedSurface, numerics: JointNumerics, place: Placing) -> Iterator[Attempt]:
-    """Yield the meshing attempts for a body: swept if it is one piece between two pads, then free-form."""
+    """Yield the meshing attempts for a body: swept if it is one piece between two pads, then free-form.
+
+    Args:
+        surface: Closed surface of the body, in its own frame.
+        numerics: Resolution of the mesh.
+        place: Function that maps points of the body's own frame to the assembly, shape (n, 3) [m] both.
+
+    Yields:
+        Method with its settings and a function that meshes the body, not yet called, in order of preference.
+    """
     one_piece = len(pieces_of(surface)) == 1
     if one_piece and all(len(pieces_of(surface, pad)) == 1 for pad in (BOARD_PAD, PACKAGE_PAD)):
         yield from _swept(surface, numerics, place)
@@ -64,7 +73,10 @@ def attempts(surface: ClosedSurface, numerics: JointNumerics, place: Placing) ->
 
 
 def free_form(surface: ClosedSurface, numerics: JointNumerics, place: Placing) -> Iterator[Attempt]:
-    """Yield the meshing attempts that suit a body of any shape: split tetrahedra of several sizes."""
+    """Yield the meshing attempts that suit a body of any shape, best first: split tetrahedra of several sizes.
+
+    Arguments as in ``attempts``.
+    """
     element = 2.0 * pad_planes(surface).gap / numerics.layers
     for share in FREE_FORM_SIZES:
         for cut in (False, True):
@@ -83,19 +95,19 @@ def _swept(surface: ClosedSurface, numerics: JointNumerics, place: Placing) -> I
 
 
 def _fill(surface: ClosedSurface, size: float, cut_into_patches: bool, place: Placing) -> Solder:
-    return free_form_solder(surface, fill_apart(surface, size, cut_into_patches), place)
+    return free_form_solder(surface, fill_in_process(surface, size, cut_into_patches), place)
 
 
-def first_good(
+def first_valid_mesh(
     surface: ClosedSurface, candidates: Iterator[Attempt], name: str, build: Callable[[Solder], JointMesh]
 ) -> JointMesh:
     """Return the first mesh that passes its checks; its record lists why earlier attempts failed.
 
     Args:
         surface: Closed surface of the body.
-        candidates: Meshing attempts in order of preference.
-        name: Name of the joint.
-        build: Function that moves the solder into the assembly and adds copper pads.
+        candidates: Meshing attempts in order of preference; no more of them are made than necessary.
+        name: Name of the joint, for the message.
+        build: Function that takes the meshed solder, moves it into the assembly and adds copper pads.
 
     Raises:
         JointMeshError: All attempts fail; the message gives the reason of each.
@@ -119,10 +131,10 @@ def shape_errors(surface: ClosedSurface, solder: Solder) -> dict[str, float]:
     """Compare the solder mesh with the surface that it fills, both in the body's own frame.
 
     Returns:
-        standoff_error: Relative error of the distance between the mean heights of the wetted faces.
-        contact_area_error: Larger relative error of the wetted areas of both sides.
-        shape_deviation: Largest distance between both surfaces [m]: from nodes and facet centres of the mesh to the
-            closed surface, and from the vertices of the closed surface to the mesh.
+        ``standoff_error``, the relative error of the distance between the mean heights of the wetted faces;
+        ``contact_area_error``, the larger relative error of the wetted areas of both sides; ``shape_deviation``, the
+        largest distance between both surfaces [m]: from nodes and facet centres of the mesh to the closed surface, and
+        from the vertices of the closed surface to the mesh. All are magnitudes.
     """
     heights = {side: _wetted(solder, side) for side in ("board", "package")}
     standoff = heights["package"][1] - heights["board"][1]

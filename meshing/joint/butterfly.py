@@ -52,7 +52,11 @@ def butterfly(core: int, rings: int, opening: float = 1.0, beyond: int = 0) -> B
 
 
 def circumradius(sides: int) -> float:
-    """Return the circumradius of a regular polygon with the area of the unit disc."""
+    """Return the circumradius of a regular polygon with the area of the unit disc.
+
+    Args:
+        sides: Number of sides of the polygon.
+    """
     angle = 2.0 * np.pi / sides
     return float(np.sqrt(angle / np.sin(angle)))
 

@@ -54,7 +54,7 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class ColumnMesh:
-    """Hexahedra of a column; new nodes are numbered after those of the joint, whose foot or head it shares.
+    """Hexahedra of a column; new nodes are numbered after the joint, whose foot or head it shares.
 
     All faces are counter-clockwise seen from outside.
 
@@ -74,7 +74,17 @@ class ColumnMesh:
 
 
 def columns_of(site: PadSite, package: Package, board: Board, side: PackageSide) -> tuple[Column, ...]:
-    """Return the columns under and over a joint, or an empty tuple if pads are not imprinted."""
+    """Return the square columns of board and package that continue the pads of a joint.
+
+    Args:
+        site: Positions and sizes of the pads.
+        package: Package, with the parameters of the imprint and the substrate.
+        board: Board, with thickness and number of layers.
+        side: Displaced underside of the package.
+
+    Returns:
+        Column under and column over the joint; an empty tuple if pads are not imprinted.
+    """
     size, imprint = package.column_size, package.imprint
     if size is None or imprint is None:
         return ()
@@ -130,6 +140,9 @@ def grow_column(column: Column, points: np.ndarray, quads: np.ndarray, rim: np.n
         quads: Quadrilaterals of the pad's outer face, counter-clockwise seen from above, shape (q, 4).
         rim: Outline nodes of that face, counter-clockwise from the one nearest to the square's lower left corner,
             shape (4 m,).
+
+    Returns:
+        New nodes, which are numbered from n, and the hexahedra and faces of the column in this numbering.
     """
     inner, local = np.unique(quads, return_inverse=True)
     flat = column.drawn(points[inner])

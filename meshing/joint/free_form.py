@@ -38,9 +38,9 @@ def free_form_solder(surface: ClosedSurface, tetrahedra: Tetrahedra, place: Plac
     are scaled about their centres to their areas, then the free surface moves along its normals until the volume fits.
 
     Args:
-        surface: Closed surface in the body's pad_triangles frame.
+        surface: Closed surface in the body's own frame.
         tetrahedra: Tetrahedra that fill it.
-        place: Map from the pad_triangles frame to the assembly, where the volume is kept; points of shape (n, 3) [m].
+        place: Map from the own frame to the assembly, where the volume is kept; points of shape (n, 3) [m].
 
     Raises:
         ValueError: The free surface would have to move too far to keep the volume.

@@ -50,7 +50,7 @@ class JointPlace:
 
     @classmethod
     def of(cls, surface: ClosedSurface, site: PadSite, side: Underside, copper: float) -> "JointPlace":
-        """Build the map, with the upper face found from the closed surface of the joint."""
+        """Build the map, with the plane of the upper face fitted to the closed surface of the joint."""
         return cls(site, side, copper, pad_planes(surface))
 
     def __call__(self, points: np.ndarray) -> np.ndarray:
@@ -196,8 +196,9 @@ def check_errors(mesh: JointMesh, errors: dict[str, float], largest_deviation: f
     """Check volume, standoff, contact areas and shape of a joint mesh against its closed surface.
 
     Args:
-        mesh: Mesh of the joint.
-        errors: Errors returned by ``shape_errors``.
+        mesh: Mesh of the joint, with the error of its volume.
+        errors: ``standoff_error``, ``contact_area_error`` and ``shape_deviation`` [m], as ``shape_errors`` returns
+            them.
         largest_deviation: Largest allowed deviation of the shape [m].
 
     Raises:
@@ -214,8 +215,9 @@ def joint_quality(mesh: JointMesh) -> dict:
     """Return the quality of a joint mesh.
 
     Returns:
-        volume_error, section_scale and head_mismatch (see ``JointMesh``); minimum_scaled_jacobian; smallest_length:
-        material role -> smallest ratio of volume and largest face of an element [m]; and the record of the mesh.
+        ``volume_error``, ``section_scale`` and ``head_mismatch`` [m] (see ``JointMesh``); ``minimum_scaled_jacobian``;
+        ``smallest_length``, material role -> smallest ratio of volume and largest face of an element [m]; and all
+        entries of the record of the mesh.
     """
     lengths: dict[str, float] = {}
     for part, cells in mesh.cells.items():
@@ -292,7 +294,7 @@ def _add_copper(parts: _Parts, name: str, face: _Face, step: np.ndarray, count: 
 
 
 def _add_tied_column(parts: _Parts, column: Column, pad: _Pad, outer: _Face, wetted: WettedFace) -> np.ndarray:
-    """Add a column whose mesh differs from the copper's, which is to be tied to it.
+    """Add a column whose mesh differs from the copper's, so that both must be tied.
 
     Args:
         parts: Joint under construction.

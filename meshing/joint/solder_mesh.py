@@ -16,7 +16,7 @@ import numpy as np
 from reflowshock.meshing.board.estimate import element_edge
 from reflowshock.meshing.board.pads import PadSite
 from reflowshock.meshing.board.parameters import Package
-from reflowshock.meshing.joint.attempts import attempts, first_good
+from reflowshock.meshing.joint.attempts import attempts, first_valid_mesh
 from reflowshock.meshing.joint.column import Column
 from reflowshock.meshing.joint.joint_mesh import (
     CopperPads,
@@ -127,8 +127,8 @@ def mesh_coarse_or_fine(
     try:
         return mesh_coarse_joint(surface, site, package, side)
     except JointMeshError as error:
-        alone = fine if package.imprint is None else mesh_joint(surface, site, package, side)
-        return replace(alone, tetrahedra=None, record=alone.record | {"fine_instead": str(error)})
+        untied = fine if package.imprint is None else mesh_joint(surface, site, package, side)
+        return replace(untied, tetrahedra=None, record=untied.record | {"fine_instead": str(error)})
 
 
 def _mesh(
@@ -142,7 +142,7 @@ def _mesh(
     _check_place(surface, to_assembly)
     candidates = attempts(surface, package.joint_numerics, to_assembly)
     build = partial(build_joint, sites=sites, copper=copper, place=to_assembly)
-    return first_good(surface, candidates, to_assembly.site.name, build)
+    return first_valid_mesh(surface, candidates, to_assembly.site.name, build)
 
 
 def _copper_pads(package: Package, columns: tuple[Column, ...]) -> CopperPads | None:

@@ -38,7 +38,17 @@ class Levels:
 
 
 def swept_solder(surface: ClosedSurface, numerics: JointNumerics, place: Placing, overhang: float = 0.0) -> Solder:
-    """Sweep hexahedra through a body from pad to pad; arguments and errors as in ``solder_levels``."""
+    """Sweep hexahedra through a body from pad to pad.
+
+    Args:
+        surface: Closed surface in the body's own frame.
+        numerics: Resolution of the section, number and heights of the layers.
+        place: Map from the own frame to the assembly, where the volume is kept; points of shape (n, 3) [m].
+        overhang: Height by which each end face is extruded as a part of the body [m].
+
+    Raises:
+        ValueError: A section is not star-shaped, or the layers are too few to keep the volume or to grow smoothly.
+    """
     section = butterfly(numerics.core, numerics.rings)
     levels = solder_levels(surface, section, numerics, place, overhang)
     count = len(section.points)
@@ -131,10 +141,15 @@ def layer_levels(height: float, numerics: JointNumerics) -> np.ndarray:
 
 
 def layer_cells(quads: np.ndarray, nodes: int, layers: int) -> np.ndarray:
-    """Sweep quadrilaterals (q, 4) through layers with ``nodes`` nodes per level.
+    """Sweep the quadrilaterals of a section through layers to hexahedra.
+
+    Args:
+        quads: Nodes of the quadrilaterals of the lowest level, shape (q, 4).
+        nodes: Number of nodes of each level; node i of level k has the number i + k ``nodes``.
+        layers: Number of layers.
 
     Returns:
-        Nodes of the hexahedra, shape (layers q, 8).
+        Nodes of the hexahedra, the lower face first, shape (layers q, 8).
     """
     return np.vstack([np.hstack([quads + k * nodes, quads + (k + 1) * nodes]) for k in range(layers)]).astype(np.int32)
 
@@ -163,8 +178,11 @@ def volume_keeping_scale(swept_volume: Callable[[float], float], volume: float) 
     """Find the scale of the inner outlines at which the mesh has the exact volume, by the secant method.
 
     Args:
-        swept_volume: Volume of the mesh as a function of the scale [m^3].
+        swept_volume: Function of the scale, 1 for the unscaled mesh, that returns the volume of the mesh [m^3].
         volume: Exact volume [m^3].
+
+    Returns:
+        Scale, near 1.
 
     Raises:
         ValueError: The scale would differ from 1 by more than the allowed correction.

@@ -1,6 +1,6 @@
 """Tetrahedral meshes of closed surfaces by Gmsh: the surface is remeshed to a size, the edges of pads are kept.
 
-Gmsh runs in a separate process (``fill_apart``), because it may crash and keeps state. Stages never load Gmsh and
+Gmsh runs in a separate process (``fill_in_process``), because it may crash and keeps state. Stages never load Gmsh and
 DOLFINx together: on Debian 13 the PETSc inside the Gmsh wheel conflicts with the one of DOLFINx, and Gmsh aborts.
 """
 
@@ -18,9 +18,9 @@ from reflowshock.meshing.surface.closed_surface import BOARD_PAD, FREE, PACKAGE_
 from reflowshock.processes import ProcessPool
 
 TRIANGLE, TETRAHEDRON = 2, 4  # Gmsh's element types
-LONGEST = 300.0  # seconds
+TIME_LIMIT = 300.0  # s
 FLAT = 1.0e-6  # of the gap: how far from a pad's plane a remeshed pad may lie
-ACROSS = 3.0  # elements across a small patch, such as the surface of a void
+ELEMENTS_ACROSS = 3.0  # elements across a small patch, such as the surface of a void
 
 
 class FreeFormError(ValueError):
@@ -66,23 +66,23 @@ def fill_with_tetrahedra(surface: ClosedSurface, size: float, cut_into_patches: 
             gmsh.model.geo.addVolume([gmsh.model.geo.addSurfaceLoop(patches)])
             gmsh.model.geo.synchronize()
             _generate(size / MILLI, patches)
-        except Exception as error:  # what Gmsh raises
+        except Exception as error:  # Gmsh raises plain exceptions
             raise FreeFormError(f"Gmsh: {error}") from error
         return _collect(pad_planes(surface).height, patches)
 
 
-def fill_apart(surface: ClosedSurface, size: float, cut_into_patches: bool) -> Tetrahedra:
+def fill_in_process(surface: ClosedSurface, size: float, cut_into_patches: bool) -> Tetrahedra:
     """Run ``fill_with_tetrahedra`` in a separate process; same arguments and errors.
 
     The mesh then does not depend on earlier calls of Gmsh, and a crash of Gmsh ends only that process.
     """
     with ProcessPool(1) as pool:
         try:
-            return pool.submit(fill_with_tetrahedra, surface, size, cut_into_patches).result(LONGEST)
+            return pool.submit(fill_with_tetrahedra, surface, size, cut_into_patches).result(TIME_LIMIT)
         except BrokenProcessPool as error:
             raise FreeFormError("Gmsh ended without an error message") from error
         except TimeoutError as error:
-            raise FreeFormError(f"Gmsh: no mesh within {LONGEST:g} s") from error
+            raise FreeFormError(f"Gmsh: no mesh within {TIME_LIMIT:g} s") from error
 
 
 def _add_patches(surface: ClosedSurface) -> None:
@@ -100,7 +100,7 @@ def _add_patches(surface: ClosedSurface) -> None:
 
 def _generate(size: float, patches: list[int]) -> None:
     """Mesh the current model with an edge length [mm], finer on small patches."""
-    smaller = {patch: extent for patch in patches if (extent := math.sqrt(_patch_area(patch)) / ACROSS) < size}
+    smaller = {patch: extent for patch in patches if (extent := math.sqrt(_patch_area(patch)) / ELEMENTS_ACROSS) < size}
     for option, value in (("Min", min([size, *smaller.values()])), ("Max", size), ("FromPoints", 0)):
         gmsh.option.setNumber(f"Mesh.MeshSize{option}", value)
     gmsh.option.setNumber("Mesh.RandomSeed", 1)

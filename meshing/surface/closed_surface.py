@@ -39,7 +39,17 @@ class ClosedSurface:
 def close_surface(
     points: np.ndarray, triangles: np.ndarray, ring_board: np.ndarray, ring_package: np.ndarray
 ) -> ClosedSurface:
-    """Close the free surface of one joint with a disc on each pad; arguments and errors as in ``close_rings``."""
+    """Close the free surface of one joint with a disc on each pad.
+
+    Args:
+        points: Vertices, shape (n, 3) [m]; vertices without a triangle are dropped.
+        triangles: Triangles of the free surface, outward oriented, open along the rings, shape (t, 3).
+        ring_board: Vertices along the contact line on the board, in order, shape (k,).
+        ring_package: Vertices along the contact line on the package, in order, shape (l,).
+
+    Raises:
+        SurfaceError: The result is not watertight, not outward oriented, or has a degenerate triangle.
+    """
     return close_rings(points, triangles, (ring_board, ring_package))
 
 
@@ -95,7 +105,10 @@ def check_surface(surface: ClosedSurface) -> None:
 
 
 def edge_numbers(edges: np.ndarray) -> np.ndarray:
-    """Return an integer key for each directed edge (e, 2), equal for equal edges, shape (e,)."""
+    """Return an integer key for each directed edge, given by its two vertices (e, 2); edges with equal keys are equal.
+
+    The result has the shape (e,); an edge and its reverse have different keys.
+    """
     return (edges[:, 0].astype(np.int64) << 32) + edges[:, 1]
 
 
@@ -105,7 +118,12 @@ def enclosed_volume(surface: ClosedSurface) -> float:
 
 
 def volume_of(points: np.ndarray, triangles: np.ndarray) -> float:
-    """Return the volume [m^3] that outward oriented triangles (t, 3) enclose (divergence theorem)."""
+    """Return the volume [m^3] that triangles enclose (divergence theorem); negative if they are oriented inwards.
+
+    Args:
+        points: Vertices, shape (n, 3) [m].
+        triangles: Outward oriented triangles of a closed surface, shape (t, 3).
+    """
     first, second, third = np.moveaxis(points[triangles], 1, 0)
     return float(np.einsum("ij,ij->", first, np.cross(second, third))) / 6.0
 
@@ -123,8 +141,9 @@ def measure(surface: ClosedSurface) -> dict[str, float]:
     and chords inside it, while the integral of A is the volume.
 
     Returns:
-        volume [m^3], standoff [m], max_width [m], contact_radius_board and _package [m], contact_angle_board and
-        _package [rad] (inside the solder, mean over the contact line).
+        ``volume`` [m^3], ``standoff`` [m], ``max_width`` [m], ``contact_radius_board`` and ``contact_radius_package``
+        [m], ``contact_angle_board`` and ``contact_angle_package`` [rad] (inside the solder, mean over the contact
+        line).
     """
     planes = pad_planes(surface)
     straight, top = planes.straighten(surface.points), planes.gap
@@ -146,11 +165,11 @@ def measure(surface: ClosedSurface) -> dict[str, float]:
 
 
 def pieces_of(surface: ClosedSurface, pad: int | None = None) -> list[np.ndarray]:
-    """Return the triangles (t, 3) of each connected piece of a surface, largest first.
+    """Return the triangles (t, 3) of each connected piece of a surface, the piece with most triangles first.
 
     Args:
         surface: Closed surface.
-        pad: BOARD_PAD or PACKAGE_PAD to consider the triangles on the pads of that side only.
+        pad: BOARD_PAD or PACKAGE_PAD to consider the triangles on the pads of that side only; None for all triangles.
     """
     triangles = surface.triangles if pad is None else surface.triangles[surface.boundary == pad]
     return [triangles[rows] for rows in pieces(triangles)]
@@ -177,7 +196,15 @@ def _cap(points: np.ndarray, ring: np.ndarray, centre: int, upward: bool) -> tup
 
 
 def area_vectors(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return the area vectors of triangles (t, 3), shape (t, 3) [m^2]."""
+    """Return the area vector of each triangle: along its normal, with its area as length.
+
+    Args:
+        points: Vertices, shape (n, 3) [m].
+        triangles: Triangles, shape (t, 3).
+
+    Returns:
+        Area vectors, shape (t, 3) [m^2].
+    """
     first, second, third = np.moveaxis(points[triangles], 1, 0)
     return 0.5 * np.cross(second - first, third - first)
 

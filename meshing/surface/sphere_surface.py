@@ -1,4 +1,4 @@
-"""A truncated sphere as the closed surface of a joint."""
+"""Truncated sphere as the closed surface of a joint."""
 
 import math
 

@@ -10,7 +10,7 @@ from reflowshock.meshing.surface.closed_surface import SurfaceError, edge_number
 
 STEP = 1.5  # ratio of successive size classes of triangles
 SMALLEST = 1.0e-6  # of the largest radius: smaller triangles share one size class
-SHAKEN = 1.0e-7  # of the extent: below the distance at which vertices are merged
+PERTURBATION = 1.0e-7  # of vertices, over the extent: below the distance at which vertices are merged
 INSIDE = 1.0e-9  # of an edge: least distance of an intersection from the edges of the other triangle
 
 
@@ -79,7 +79,7 @@ def _crossings(points: np.ndarray, triangles: np.ndarray) -> Iterator[tuple[str,
     where edges only touch.
     """
     extent = float(np.ptp(points, axis=0).max())
-    points = points + np.random.default_rng(0).uniform(-SHAKEN * extent, SHAKEN * extent, points.shape)
+    points = points + np.random.default_rng(0).uniform(-PERTURBATION * extent, PERTURBATION * extent, points.shape)
     for first, second in _near_pairs(points, triangles):
         apart = (triangles[first][:, :, None] != triangles[second][:, None, :]).all(axis=(1, 2))
         for edge_owner, other in ((first[apart], second[apart]), (second[apart], first[apart])):

@@ -73,12 +73,31 @@ def load_surface(path: Path, unit: Unit, site: PadSite) -> ClosedSurface:
 
 
 def file_volume(path: Path, unit: Unit) -> float:
-    """Return the volume [m^3] that the surface in a file encloses, before its heights are stretched."""
+    """Return the volume [m^3] that the surface in a file encloses, before its heights are stretched.
+
+    Args:
+        path: STL, PLY or VTU file of triangles.
+        unit: Unit of the coordinates in the file.
+
+    Raises:
+        SurfaceError: The file is damaged, or its triangles do not enclose a body.
+    """
     return volume_of(*closed_triangles(path, unit))
 
 
 def closed_triangles(path: Path, unit: Unit) -> tuple[np.ndarray, np.ndarray]:
-    """Read and check vertices (n, 3) [m] and triangles (t, 3) of a file; errors as in ``load_surface``."""
+    """Read and check the surface in a file.
+
+    Args:
+        path: STL, PLY or VTU file of triangles.
+        unit: Unit of the coordinates in the file.
+
+    Returns:
+        Vertices, shape (n, 3) [m], and triangles, shape (t, 3).
+
+    Raises:
+        SurfaceError: The file is damaged, or its triangles do not enclose a body.
+    """
     if path.suffix.lower() not in SUFFIXES:
         raise SurfaceError(f"suffix {path.suffix or 'none'}, allowed {', '.join(SUFFIXES)}")
     try:
@@ -108,12 +127,12 @@ def _read(path: Path, scale: float) -> tuple[np.ndarray, np.ndarray]:
     try:
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()), np.errstate(all="ignore"):  # meshio prints
             mesh = meshio.read(path)
-    except (Exception, SystemExit) as error:  # whatever a reader makes of a broken file
+    except (Exception, SystemExit) as error:  # readers of meshio raise any type for a damaged file
         kind = path.suffix[1:].upper()
         raise SurfaceError(f"cannot be read as {kind}: it is damaged, cut off, or of another format") from error
     others = sorted({block.type for block in mesh.cells} - {"triangle", "vertex", "line"})
     if others or not len(mesh.cells_dict.get("triangle", ())):
-        raise SurfaceError(f"holds {', '.join(others) or 'no facets'}, allowed triangles")
+        raise SurfaceError(f"contains {', '.join(others) or 'no facets'}, allowed triangles")
     points, triangles = np.asarray(mesh.points, float), mesh.cells_dict["triangle"].astype(np.int64)
     _check_numbers(points, triangles)
     _check_extent(scale * points[:, :3])
@@ -193,7 +212,7 @@ def _between_pads(points: np.ndarray, triangles: np.ndarray, site: PadSite) -> C
 
 
 def site_slope(site: PadSite) -> np.ndarray:
-    """Return the slopes along x and y of a plane rotated by the tilt of a site, shape (2,)."""
+    """Return the slopes dz/dx and dz/dy of the package's pad at a site, shape (2,), from its tilt."""
     turn_x, turn_y = site.tilt
     angle = float(np.hypot(turn_x, turn_y))
     steep = np.tan(angle) / angle if angle else 1.0

@@ -15,7 +15,7 @@ class JointGeometry:
         gap: Height of the centre of the package's disc [m].
         radius_board: Radius of the wetted disc on the board [m].
         radius_package: Radius of the wetted disc on the package [m].
-        offset: x and y of the centre of the package's disc [m].
+        offset: Coordinates x and y of the centre of the package's disc [m].
         tilt: Rotations of the package's disc about the x and the y axis through its centre [rad].
     """
 

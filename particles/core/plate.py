@@ -16,7 +16,7 @@ class Pad:
     """A round pad in the solder mask of a plate.
 
     Attributes:
-        centre: x and y in the frame of the plate [m].
+        centre: Coordinates x and y of the centre in the frame of the plate [m].
         radius: Radius of the pad [m]; infinite if it covers the whole plate.
         angle: Contact angle on the pad [rad].
     """

@@ -92,7 +92,7 @@ def whole_points(cloud: Cloud, points: Floats, wall: int) -> tuple[Floats, Indic
     Args:
         cloud: Cloud of the computed part.
         points: Positions of its particles, shape (n, 3) [m].
-        wall: index of the contact line.
+        wall: Index of the contact line.
     """
     ring = cloud.rings[wall]
     index, signs = whole_line(cloud, len(ring))

@@ -91,7 +91,7 @@ class EffectiveMass:
     P removes the mass-orthonormal rigid-body motions R: P^T K P = K - m R^T R K - K R^T R m + m R^T R K R^T R m.
 
     Attributes:
-        inertia: m / dt, shape (d,) [kg/s].
+        inertia: Masses over the time step, m / dt, shape (d,) [kg/s].
         factors: Factors of m / dt + dt K, shape (s, s).
         across: Columns m R^T and K R^T, shape (d, 2 k).
         moved: Solutions for these columns, shape (d, 2 k).

@@ -14,7 +14,7 @@ from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.tetrahedra import cell_volumes, thick_cells, volume_gradients
 
 
-def interpolation(points: Floats, cells: Indices, offset: Floats) -> sparse.csr_matrix:
+def interpolation_matrix(points: Floats, cells: Indices, offset: Floats) -> sparse.csr_matrix:
     """Return the interpolation at ``points + offset`` of fields linear in the tetrahedra; rows sum to one.
 
     Args:

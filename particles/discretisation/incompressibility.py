@@ -30,10 +30,10 @@ class SaddlePoint:
     """Saddle-point problem without fixed degrees of freedom.
 
     Attributes:
-        operator: A, shape (d, d) [kg/s].
-        constraint: C, shape (m, d) [m^2].
-        load: f, shape (d,) [N].
-        rate: g, shape (m,) [m^3/s].
+        operator: Matrix A, shape (d, d) [kg/s].
+        constraint: Volume gradients C, shape (m, d) [m^2].
+        load: Load f, shape (d,) [N].
+        rate: Required rates of volume g, shape (m,) [m^3/s].
         stabilisation: S, symmetric positive semidefinite, shape (m, m) [m^3/(Pa s)]; None if C needs none.
         guess: Initial guess of the pressure, shape (m,) [Pa]; None for zero.
     """
@@ -77,7 +77,7 @@ def to_petsc_spd(matrix: sparse.csr_matrix) -> PETSc.Mat:
     return result
 
 
-def cholesky(matrix: sparse.csr_matrix) -> PETSc.KSP:
+def factor_cholesky(matrix: sparse.csr_matrix) -> PETSc.KSP:
     """Return a solver with the Cholesky factors of a symmetric positive definite matrix, by MUMPS."""
     solver = PETSc.KSP().create(PETSc.COMM_SELF)
     solver.setOperators(to_petsc_spd(matrix))
@@ -97,7 +97,7 @@ class _FactoredInverse:
         self._diagonal = matrix.diagonal()
         self._solver = None
         if len(self._coupled) > 0:
-            self._solver = cholesky(matrix[self._coupled][:, self._coupled])
+            self._solver = factor_cholesky(matrix[self._coupled][:, self._coupled])
             self._solution, self._right = self._solver.getOperators()[0].createVecs()
 
     def __call__(self, right: Floats) -> Floats:
@@ -127,7 +127,7 @@ def _leak(problem: SaddlePoint, pressure: Floats) -> Floats | float:
     return 0.0 if problem.stabilisation is None else problem.stabilisation @ pressure
 
 
-def solve(problem: SaddlePoint) -> Solution:
+def solve_saddle_point(problem: SaddlePoint) -> Solution:
     """Solve by conjugate gradients on the Schur complement, preconditioned with C diag(A)^-1 C^T + S.
 
     Args:
@@ -178,7 +178,7 @@ def check_residuals(problem: SaddlePoint, solution: Solution, reason: int, scale
         solution: Its approximate solution.
         reason: Convergence reason of PETSc, positive if it converged.
         scale: Norm of the rates of volume that the pressure had to supply [m^3/s].
-        leak: S p, shape (m,) [m^3/s].
+        leak: Stabilisation term S p, shape (m,) [m^3/s].
 
     Raises:
         SolveFailed: A relative residual exceeds the limit.

@@ -20,7 +20,7 @@ from reflowshock.particles.core.tetrahedra import boundary_triangles, cell_volum
 Mask = NDArray[np.bool_]
 
 
-def fill(body: Body) -> Indices:
+def fill_with_tetrahedra(body: Body) -> Indices:
     """Return tetrahedra between the particles of a body whose boundary is its surface, shape (t, 4)."""
     cells = tetrahedralise(body.points, body.cloud.spacing)
     wall = body.cloud.wall

@@ -55,7 +55,7 @@ def conjugate_gradients(
         tolerance: Tolerance of the residual.
 
     Returns:
-        x and the number of iterations.
+        Solution x and the number of iterations.
 
     Raises:
         SolveFailed: The true residual exceeds the limit.
@@ -137,7 +137,7 @@ class LaggedCholesky:
             tolerance: Tolerance of the residual.
 
         Returns:
-            x, shape (n,).
+            Solution x, shape (n,).
 
         Raises:
             SolveFailed: The true residual exceeds the limit, or A has no Cholesky factors.

@@ -32,7 +32,7 @@ class LaggedMultigrid(LaggedSolver):
             flux: Right-hand side b, shape (n,).
 
         Returns:
-            phi, shape (n,), and the number of iterations.
+            Solution phi, shape (n,), and the number of iterations.
 
         Raises:
             SolveFailed: The true residual exceeds the limit.

@@ -5,10 +5,10 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from reflowshock.effect import Decision, Effect, Switch, decided, decision
+from reflowshock.effect import Decision, Effect, Switch, decide_all, decision
 from reflowshock.particles.flows.flow import FlowScene, FlowSwitches
 from reflowshock.particles.flows.sph_numerics import MethodNumerics
-from reflowshock.particles.parameters.effects import NEGLIGIBLE_SHAPE_CHANGE, SHAPE_CHANGE_BY_BOND
+from reflowshock.particles.parameters.effect_gravity import NEGLIGIBLE_SHAPE_CHANGE, SHAPE_CHANGE_BY_BOND
 from reflowshock.quantity import Quantity
 
 RIGHT_ANGLE = 0.5 * pi
@@ -171,7 +171,7 @@ class Droplet(FlowScene):
 
     def decide_own_effects(self) -> dict[str, Decision]:
         """Decide on surface tension and gravity."""
-        return decided(DROPLET_EFFECTS, self)
+        return decide_all(DROPLET_EFFECTS, self)
 
 
 class DropletTension(Effect[Droplet]):

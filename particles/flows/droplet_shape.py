@@ -9,7 +9,7 @@ from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.grid import Grid
 from reflowshock.particles.flows.droplet import Droplet
 from reflowshock.particles.surface.cloud_level_set import boundary_loops
-from reflowshock.particles.surface.level_set import LevelSet, extract_surface, relax
+from reflowshock.particles.surface.level_set import LevelSet, extract_surface, smooth_on_level_set
 
 
 def start_shape(scene: Droplet, edge: float) -> tuple[Floats, tuple[Floats, Indices], float]:
@@ -67,7 +67,7 @@ def _cube(width: float, edge: float) -> tuple[Floats, Indices]:
     grid = Grid.around(width * np.array([[-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]]), edge)
     x, y, z = np.meshgrid(*grid.axes(), indexing="ij")
     level = LevelSet(grid, np.maximum(np.maximum(np.abs(x), np.abs(y)), np.abs(z)) - 0.5 * width)
-    return relax(level, *extract_surface(level), ())
+    return smooth_on_level_set(level, *extract_surface(level), ())
 
 
 def _half(points: Floats, triangles: Indices, edge: float) -> tuple[Floats, Indices]:

@@ -1,4 +1,4 @@
-"""Base classes of SPH scenes: density, viscosity, size, largest speed, duration and resolution."""
+"""Base classes of flows: density, viscosity, size, largest speed, duration and resolution."""
 
 from abc import abstractmethod
 from typing import Annotated, ClassVar
@@ -7,8 +7,10 @@ from pydantic import Field
 
 from reflowshock.effect import Decision, Switch
 from reflowshock.parameters import Parameters
+from reflowshock.particles.flows.flow_method import FlowNumerics
+from reflowshock.particles.flows.methods import PlaneNumerics
 from reflowshock.particles.flows.rheology import Rheology
-from reflowshock.particles.flows.sph_numerics import CENTRAL, MethodNumerics, SphNumerics, largest_time_step
+from reflowshock.particles.flows.sph_numerics import SphNumerics
 from reflowshock.quantity import Quantity
 
 
@@ -33,7 +35,7 @@ class FlowScene(Parameters):
     viscosity: Annotated[float, Quantity("Pa*s")] = Field(1.0e-3, gt=0)
     rheology: Rheology | None = None
     effects: FlowSwitches = FlowSwitches()
-    numerics: MethodNumerics = MethodNumerics()
+    numerics: FlowNumerics
 
     @property
     @abstractmethod
@@ -70,11 +72,6 @@ class FlowScene(Parameters):
         return {}
 
     @property
-    def sound(self) -> float:
-        """Speed of sound [m/s]."""
-        return self.numerics.sound_speed * self.fastest
-
-    @property
     def reynolds_number(self) -> float:
         """Reynolds number from the characteristic length and the largest speed."""
         return self.density * self.fastest * self.length / self.liquid_viscosity
@@ -98,10 +95,7 @@ class FlowScene(Parameters):
 
     def expected_time_step(self, is_viscous: bool) -> float:
         """Return the expected time step [s], with or without viscosity."""
-        length, viscosity = self.numerics.smoothing_length * self.spacing, 0.0
-        if is_viscous:
-            viscosity = self.largest_viscosity * (CENTRAL if self.has_free_surface else 1.0)
-        return largest_time_step(length, self.sound + self.fastest, self.density, viscosity, self.tension)
+        return self.numerics.time_step(self, is_viscous)
 
 
 class PlaneFlow(FlowScene):
@@ -109,7 +103,7 @@ class PlaneFlow(FlowScene):
 
     dimension = 2
 
-    numerics: SphNumerics = SphNumerics()
+    numerics: PlaneNumerics = SphNumerics()
 
     @property
     def spacing(self) -> float:

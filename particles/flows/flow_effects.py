@@ -2,21 +2,26 @@
 
 from abc import abstractmethod
 from math import sqrt
-from typing import Any
+from typing import Any, cast
 
-from reflowshock.effect import Decision, Effect, decided, decision
-from reflowshock.parameters import changed
+from reflowshock.effect import Decision, Effect, decide_all, decision
+from reflowshock.parameters import with_value
 from reflowshock.particles.flows.flow import FlowScene
-from reflowshock.particles.flows.sph_numerics import ARTIFICIAL_VISCOSITY
+from reflowshock.particles.flows.sph_numerics import ARTIFICIAL_VISCOSITY, MethodNumerics
 
 # Boundary layer thickness over the length of the flow, below which viscosity is neglected.
 THIN_LAYER = 0.01
 
 
 class FlowEffect(Effect[FlowScene]):
-    """An effect of a flow."""
+    """An effect of a flow.
+
+    Attributes:
+        methods: Methods that the effect belongs to; empty for all.
+    """
 
     stage = "particles"
+    methods: tuple[str, ...] = ()
 
     @abstractmethod
     def decide(self, scene: FlowScene) -> Decision:
@@ -54,13 +59,14 @@ class ArtificialViscosity(FlowEffect):
     influence = "nu t / L^2, nu = alpha h c0 / 8"
     implementation = "reflowshock.particles.sph.pair_terms.artificial_viscosity"
     switch = "<scene>.numerics.artificial_viscosity"
+    methods = ("sph",)
     source = "Monaghan 1992; Antuono et al. 2012"
 
     def decide(self, scene: FlowScene) -> Decision:
         """Enable it where viscosity is off, unless the user sets alpha."""
-        user_alpha, viscous = scene.numerics.artificial_viscosity, FlowViscosity().decide(scene)["on"]
+        user_alpha, viscous = sph_numerics(scene).artificial_viscosity, FlowViscosity().decide(scene)["on"]
         alpha = artificial_viscosity(scene)
-        kinematic_viscosity = scene.numerics.smoothing_length * scene.spacing * scene.sound * alpha / 8.0
+        kinematic_viscosity = sph_numerics(scene).smoothing_length * scene.spacing * sph_sound(scene) * alpha / 8.0
         influence = min(kinematic_viscosity * scene.until / scene.length**2, 1.0)
         if user_alpha is not None:
             return decision(user_alpha > 0.0, f"numerics.artificial_viscosity = {user_alpha:g}", influence)
@@ -85,17 +91,27 @@ class ShearDependence(FlowEffect):
         why = f"{rheology.law.replace('_', ' ')}, exponent {rheology.exponent:g}"
         return decision(viscous, why if viscous else f"{why}, but viscosity does not act")
 
-    def other_way(self, case: Any, acts: bool) -> Any | None:
+    def toggled(self, case: Any, acts: bool) -> Any | None:
         """Return the case with constant viscosity; None if the effect is off, since no rheology is specified."""
-        return changed(case, f"{case.kind}.rheology", None) if acts else None
+        return with_value(case, f"{case.kind}.rheology", None) if acts else None
 
 
 FLOW_EFFECTS = (FlowViscosity(), ArtificialViscosity(), ShearDependence())
 
 
+def sph_numerics(scene: FlowScene) -> MethodNumerics:
+    """Return the numerical parameters of a flow by delta-SPH."""
+    return cast(MethodNumerics, scene.numerics)
+
+
+def sph_sound(scene: FlowScene) -> float:
+    """Return the speed of sound of a flow by delta-SPH [m/s]."""
+    return sph_numerics(scene).sound(scene.fastest)
+
+
 def artificial_viscosity(scene: FlowScene) -> float:
     """Return the coefficient alpha of the artificial viscosity: set by the user, or the default."""
-    user_alpha = scene.numerics.artificial_viscosity
+    user_alpha = sph_numerics(scene).artificial_viscosity
     if user_alpha is not None:
         return user_alpha
     return 0.0 if FlowViscosity().decide(scene)["on"] else ARTIFICIAL_VISCOSITY
@@ -103,4 +119,6 @@ def artificial_viscosity(scene: FlowScene) -> float:
 
 def decide_flow(scene: FlowScene) -> dict[str, Decision]:
     """Decide on all effects of a flow, the common and the specific ones: name -> decision."""
-    return decided(FLOW_EFFECTS, scene.unit_scene) | scene.decide_own_effects()
+    method = scene.numerics.method
+    effects = [effect for effect in FLOW_EFFECTS if not effect.methods or method in effect.methods]
+    return decide_all(effects, scene.unit_scene) | scene.decide_own_effects()

@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from reflowshock.effect import Decision, Effect, Switch, decided, decision
-from reflowshock.parameters import Parameters, changed
+from reflowshock.effect import Decision, Effect, Switch, decide_all, decision
+from reflowshock.parameters import Parameters, with_value
 from reflowshock.particles.flows.droplet import RIGHT_ANGLE, Droplet, DropletEffects, DropletNumerics, cap
 from reflowshock.particles.flows.flow import FlowScene
 from reflowshock.particles.flows.freezing import Freezing
@@ -200,7 +200,7 @@ class Printing(FlowScene):
 
     def decide_own_effects(self) -> dict[str, Decision]:
         """Decide on surface tension and gravity of one drop, and on freezing."""
-        return self.drop.decide_own_effects() | decided(PRINTING_EFFECTS, self)
+        return self.drop.decide_own_effects() | decide_all(PRINTING_EFFECTS, self)
 
 
 @lru_cache(maxsize=8)  # read in every step
@@ -242,9 +242,9 @@ class InkFreezing(Effect[Printing]):
             why = f"set to {switch} by the user ({why})"
         return decision(scene.freezes, why, scene.share_frozen)
 
-    def other_way(self, case: Any, acts: bool) -> Any | None:
+    def toggled(self, case: Any, acts: bool) -> Any | None:
         """Return the case with drops cured by light; None if the effect is off."""
-        return changed(case, f"{case.kind}.freezing", None) if acts else None
+        return with_value(case, f"{case.kind}.freezing", None) if acts else None
 
 
 PRINTING_EFFECTS = (InkFreezing(),)

@@ -1,11 +1,12 @@
 """Numerical parameters of delta-SPH and its largest stable time step."""
 
+from collections.abc import Mapping
 from math import pi, sqrt
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from reflowshock.parameters import Parameters
+from reflowshock.particles.flows.flow_method import FlowNumerics, FlowScale
 
 # Default alpha of an inviscid liquid, as in the dam breaks of Marrone et al. 2011.
 ARTIFICIAL_VISCOSITY = 0.02
@@ -16,7 +17,7 @@ COURANT, DIFFUSIVE, CAPILLARY = 0.25, 0.125, 0.25
 CENTRAL = 2.0
 
 
-class MethodNumerics(Parameters):
+class MethodNumerics(FlowNumerics):
     """Numerical parameters of delta-SPH, apart from the resolution.
 
     The smoothing length is relative to the particle spacing, the speed of sound to the largest expected speed. The
@@ -27,6 +28,10 @@ class MethodNumerics(Parameters):
     surface is always computed on the processor.
     """
 
+    devices = ("cpu", "cuda")
+    study_values: ClassVar[Mapping[str, tuple[float, ...]]] = {"smoothing_length": (1.2, 1.5, 2.0)}
+
+    method: Literal["sph"] = "sph"
     device: Literal["cpu", "cuda"] = "cpu"
     kernel: Literal["cubic_spline", "wendland"] = "cubic_spline"
     smoothing_length: float = Field(1.3, ge=1.0, le=2.5)
@@ -35,6 +40,18 @@ class MethodNumerics(Parameters):
     density_gradient: Literal["renormalised", "reproducing"] = "renormalised"
     artificial_viscosity: float | None = Field(None, ge=0, le=0.5)
     xsph: float = Field(0.0, ge=0, le=1)
+
+    def sound(self, fastest: float) -> float:
+        """Return the speed of sound [m/s] for a largest expected speed [m/s]."""
+        return self.sound_speed * fastest
+
+    def time_step(self, scale: FlowScale, is_viscous: bool) -> float:
+        """Return the expected time step [s], with or without viscosity."""
+        length, viscosity = self.smoothing_length * scale.spacing, 0.0
+        if is_viscous:
+            viscosity = scale.largest_viscosity * (CENTRAL if scale.has_free_surface else 1.0)
+        speed = self.sound(scale.fastest) + scale.fastest
+        return largest_time_step(length, speed, scale.density, viscosity, scale.tension)
 
 
 class SphNumerics(MethodNumerics):

@@ -15,8 +15,8 @@ from scipy import sparse
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.plate import Plate
-from reflowshock.particles.gripc.moving_least_squares import SUPPORT, derivatives, shape_functions
-from reflowshock.particles.ispg.ghosts import mirror
+from reflowshock.particles.gripc.moving_least_squares import SUPPORT, fit_derivatives, fit_shape_functions
+from reflowshock.particles.ispg.ghosts import mirror_particles
 
 Matrix: TypeAlias = sparse.csr_matrix
 
@@ -61,7 +61,7 @@ def collocate(points: Floats, plates: Sequence[Plate], spacing: float, basis: st
         DegenerateStencil: The derivatives at a particle cannot be fitted.
     """
     count, rows = len(points), np.arange(len(points), dtype=np.int32)
-    ghosts = mirror(points, plates, SUPPORT[basis] * spacing)
+    ghosts = mirror_particles(points, plates, SUPPORT[basis] * spacing)
     everything = np.concatenate((points, ghosts.points))
     even, vector = ghosts.even(count), ghosts.vector(count)
 
@@ -70,8 +70,8 @@ def collocate(points: Floats, plates: Sequence[Plate], spacing: float, basis: st
         lists.update(everything)
         return lists
 
-    fitted = derivatives(everything, rows, neighbours(basis), basis)
-    shape = shape_functions(everything, rows, neighbours("linear"))
+    fitted = fit_derivatives(everything, rows, neighbours(basis), basis)
+    shape = fit_shape_functions(everything, rows, neighbours("linear"))
     values = shape if basis == "linear" else sparse.eye(*shape.shape, format="csr")
     components = sparse.identity(3)
     return Operators(

@@ -30,7 +30,7 @@ from reflowshock.particles.gripc.projection import (
     Velocities,
     correct_pressure,
     predict_velocity,
-    smooth,
+    smooth_velocities,
 )
 from reflowshock.particles.physics.operators import Mass, Viscosity
 from reflowshock.particles.physics.physics import Physics
@@ -113,7 +113,7 @@ class PreparedGripcStep:
         poisson = Poisson(operators, surface, basis)
         correction = correct_pressure(poisson, material, operators.divergence @ predicted, body.pressure, boundary)
         coefficients = self._admit(predicted - self._impulse(correction) / material.inertia)
-        self.solver.velocities = smooth(self.last, coefficients, operators.smoothing)
+        self.solver.velocities = smooth_velocities(self.last, coefficients, operators.smoothing)
         velocity = _by_particle(self._admit(operators.smoothing @ coefficients))
         return Motion(
             velocity, velocity, correction.pressure, float(boundary[surface].mean()), {}, correction.iterations

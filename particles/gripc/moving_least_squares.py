@@ -38,7 +38,7 @@ class Derivatives:
     order: NDArray[np.int8]
 
 
-def derivatives(points: Floats, rows: NDArray[np.int32], neighbours: NeighbourList, basis: str) -> Derivatives:
+def fit_derivatives(points: Floats, rows: NDArray[np.int32], neighbours: NeighbourList, basis: str) -> Derivatives:
     """Fit the derivative operators at some particles.
 
     Args:
@@ -57,7 +57,7 @@ def derivatives(points: Floats, rows: NDArray[np.int32], neighbours: NeighbourLi
     return Derivatives(rows, (first, second, third), laplacian, order)
 
 
-def shape_functions(points: Floats, rows: NDArray[np.int32], neighbours: NeighbourList) -> sparse.csr_matrix:
+def fit_shape_functions(points: Floats, rows: NDArray[np.int32], neighbours: NeighbourList) -> sparse.csr_matrix:
     """Return the linear MLS shape functions psi_J at some particles (Hu et al., eq 11); rows sum to 1.
 
     Args:

@@ -145,7 +145,7 @@ class Velocities:
     unsmoothed: Floats
 
 
-def smooth(last: Velocities, coefficients: Floats, smoothing: sparse.csr_matrix) -> Velocities:
+def smooth_velocities(last: Velocities, coefficients: Floats, smoothing: sparse.csr_matrix) -> Velocities:
     """Return the velocities after a step, u_new = (1 - a) (u + S (V_new - V)) + a S V_new with a = 0.5 (eq 28).
 
     Args:
@@ -163,12 +163,12 @@ def solve_gmres(matrix: sparse.csr_matrix, right: Floats, basis: str) -> tuple[F
     The preconditioner is algebraic multigrid, or an LU factorisation for the linear basis.
 
     Args:
-        matrix: A, shape (d, d).
-        right: b, shape (d,).
+        matrix: Matrix A, shape (d, d).
+        right: Right-hand side b, shape (d,).
         basis: Basis of the operators in A, "linear" or "quadratic".
 
     Returns:
-        x, shape (d,), and the number of iterations.
+        Solution x, shape (d,), and the number of iterations.
 
     Raises:
         SolveFailed: The true residual of the scaled system exceeds the limit.

@@ -19,9 +19,9 @@ from reflowshock.particles.core.cloud import Cloud
 from reflowshock.particles.core.neighbours import find_near, find_neighbours
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.ispg import galerkin_kernels as kernels
-from reflowshock.particles.ispg.ghosts import Ghosts, mirror
+from reflowshock.particles.ispg.ghosts import Ghosts, mirror_particles
 from reflowshock.particles.ispg.moving_plates import FloatingModes
-from reflowshock.particles.ispg.nodal_volumes import body_moments, cell_share, nodal_volumes, with_moments
+from reflowshock.particles.ispg.nodal_volumes import body_moments, cell_share, fit_to_moments, nodal_volumes
 from reflowshock.particles.ispg.stencils import check_stencils
 
 # Search radius for neighbours in spacings, and the larger one of particles with too few of them.
@@ -74,7 +74,7 @@ class GalerkinSpace:
         count, spacing = len(body.points), body.cloud.spacing
         planes = symmetry_planes(body.cloud)
         slips = [slip_length] * len(body.plates) + [np.inf] * len(planes)
-        ghosts = mirror(body.points, (*body.plates, *planes), WIDEST * spacing, slips)
+        ghosts = mirror_particles(body.points, (*body.plates, *planes), WIDEST * spacing, slips)
         points = np.concatenate((body.points, ghosts.points))
         lists = find_neighbours(points, REACH * spacing, rows=count)
         squares, lengths = kernels.supports(np.arange(count), points, (*lists, REACH * spacing), spacing)
@@ -93,7 +93,7 @@ class GalerkinSpace:
         moments = body_moments(body)
         volumes = nodal_volumes(body, density, moments)
         spread = kernels.spread(starts, columns, weights, volumes, ghosts.source)
-        carried = with_moments(body, np.maximum(volumes + spread, LEAST_CARRIED * volumes), moments)
+        carried = fit_to_moments(body, np.maximum(volumes + spread, LEAST_CARRIED * volumes), moments)
         drift = ghosts.drift(body.points, (*body.plates, *planes), twists) if twists else np.zeros_like(ghosts.points)
         order = np.argsort(body.points[:, np.argmax(np.ptp(body.points, axis=0))], kind="stable")
         return cls(volumes, carried, starts, columns, weights, ghosts, order, drift)

@@ -43,7 +43,7 @@ class Ghosts:
 
         Args:
             points: Particle positions, shape (n, 3) [m].
-            plates: Walls, as passed to ``mirror``.
+            plates: Walls, as passed to ``mirror_particles``.
             twists: Twist of each moving plate by its index, shape (6,) [m/s, rad/s].
         """
         count, everything = len(points), np.concatenate((points, self.points))
@@ -79,7 +79,7 @@ class Ghosts:
         return result
 
 
-def mirror(
+def mirror_particles(
     points: Floats, plates: Sequence[Plate], reach: float, slip_lengths: Sequence[float] | None = None
 ) -> Ghosts:
     """Mirror the particles near each plate, plate by plate.

@@ -36,12 +36,12 @@ from reflowshock.particles.ispg.rigid_motions import (
     admitted_motions,
     constrained_part,
     edges_are_coaxial,
-    orthonormal,
+    orthonormalise,
     rigid_momenta,
     rigid_motions,
     wall_velocities,
 )
-from reflowshock.particles.ispg.state import GalerkinState, Prediction, centre, smoothing_passes
+from reflowshock.particles.ispg.state import GalerkinState, Prediction, find_centre, smoothing_passes
 from reflowshock.particles.ispg.step_kernels import admitted_stiffness, projected
 from reflowshock.particles.ispg.wall_forces import StepSolution, WallForces
 from reflowshock.particles.physics.forces import SurfaceTension
@@ -263,7 +263,7 @@ class PreparedIspgStep:
         gradient, time_step = equations.space.gradient(end.velocity), end.history.time_step
         return GalerkinState(
             points=end.body.points,
-            centre=centre(body) + equations.masses @ end.history.displacement / equations.masses.sum(),
+            centre=find_centre(body) + equations.masses @ end.history.displacement / equations.masses.sum(),
             velocity=end.velocity,
             gradient=gradient,
             kinetic=equations.kinetic_energy(end.velocity),
@@ -362,7 +362,7 @@ class PreparedIspgStep:
         space, spacing = GalerkinSpace.of(body, 0.0 if sticks else slip, twists), body.cloud.spacing
         masses, motions = fluid.density * space.carried, self.physics.motions
         space = replace(space, floating=FloatingModes.of(motions, body, self.projections, masses, space.drift_of))
-        rigid = orthonormal(rigid_motions(body.points)[self.admitted], masses)
+        rigid = orthonormalise(rigid_motions(body.points)[self.admitted], masses)
         stiffness = self.tension * area_stiffness(body.points, body.triangles, body.cloud.surface_count)
         free = admitted_stiffness(stiffness, self.projections)
         return GalerkinEquations(

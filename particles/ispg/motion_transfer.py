@@ -19,7 +19,7 @@ from reflowshock.particles.ispg.galerkin_equations import GalerkinEquations
 from reflowshock.particles.ispg.galerkin_space import AT_REST
 from reflowshock.particles.ispg.ispg_step import IspgStep, PreparedIspgStep
 from reflowshock.particles.ispg.rigid_motions import admitted_motions, rigid_momenta, rigid_motions
-from reflowshock.particles.ispg.state import GalerkinState, centre
+from reflowshock.particles.ispg.state import GalerkinState, find_centre
 from reflowshock.particles.physics.physics import Physics
 
 NEIGHBOURS = 8
@@ -81,8 +81,7 @@ def transfer_motion(new: Sequence[MovingBody], old: Sequence[MovingBody]) -> Non
     states, twists = [part.state for part in old], [_plate_twists(part.body, old) for part in new]
     equations = [part.equations(of_plates) for part, of_plates in zip(new, twists, strict=True)]
     velocities = [
-        system.prescribed
-        + part.physics.admit(part.body, interpolated_velocity(part.body.points, states, _spacing(old)))
+        system.prescribed + part.physics.admit(part.body, interpolate_velocity(part.body.points, states, _spacing(old)))
         for part, system in zip(new, equations, strict=True)
     ]
     momenta = sum((state.momenta for state in states), np.zeros(6))
@@ -97,7 +96,7 @@ def transfer_motion(new: Sequence[MovingBody], old: Sequence[MovingBody]) -> Non
             kinetic=system.kinetic_energy(velocity),
             momenta=rigid_momenta(motions, system.masses, velocity),
             volumes=system.space.carried,
-            centre=centre(part.body) + lag,
+            centre=find_centre(part.body) + lag,
             plates={wall: np.stack((np.zeros(6), twist, np.zeros(6))) for wall, twist in of_plates.items()},
         )
         part.solver.first_energy = 0.0
@@ -120,7 +119,7 @@ def _plate_twists(body: Body, old: Sequence[MovingBody]) -> dict[int, Floats]:
 def _centre_lag(old: Sequence[MovingBody], states: Sequence[GalerkinState]) -> Floats:
     """Return the vector from the centre of the bodies to the one predicted from their momenta, shape (3,) [m]."""
     volumes = np.array([part.body.volume()[0] for part in old])
-    lags = np.array([state.centre - centre(part.body) for part, state in zip(old, states, strict=True)])
+    lags = np.array([state.centre - find_centre(part.body) for part, state in zip(old, states, strict=True)])
     return volumes @ lags / volumes.sum()
 
 
@@ -129,7 +128,7 @@ def _spacing(bodies: Sequence[MovingBody]) -> float:
     return min(part.body.cloud.spacing for part in bodies)
 
 
-def interpolated_velocity(points: Floats, states: Sequence[GalerkinState], spacing: float) -> Floats:
+def interpolate_velocity(points: Floats, states: Sequence[GalerkinState], spacing: float) -> Floats:
     """Interpolate the velocity of old particles at new points, exactly for linear velocity fields.
 
     Args:

@@ -51,7 +51,8 @@ class PlateHistory:
         """
         prescribed = [motion for motion in motions if not len(motion.directions)]
         displacements = {
-            motion.wall: time_step * motion.given(body.plates[motion.wall], time_step) for motion in prescribed
+            motion.wall: time_step * motion.prescribed_twist(body.plates[motion.wall], time_step)
+            for motion in prescribed
         }
         return {wall: self.last(wall).mean_along(change, time_step) for wall, change in displacements.items()}
 

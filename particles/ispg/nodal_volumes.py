@@ -112,10 +112,10 @@ def nodal_volumes(body: Body, density: Floats, moments: Moments) -> Floats:
     """
     # Only half of the surroundings of a surface particle are liquid.
     on_wall = np.where(body.cloud.wall >= 0, 0.5, 1.0)
-    return with_moments(body, cell_share(body) ** 2 / density * on_wall * share(body.cloud), moments)
+    return fit_to_moments(body, cell_share(body) ** 2 / density * on_wall * share(body.cloud), moments)
 
 
-def with_moments(body: Body, cells: Floats, moments: Moments) -> Floats:
+def fit_to_moments(body: Body, cells: Floats, moments: Moments) -> Floats:
     """Return the volumes closest to given cells that have the moments of the body, shape (n,) [m^3].
 
     Args:
@@ -131,7 +131,7 @@ def with_moments(body: Body, cells: Floats, moments: Moments) -> Floats:
     central = (second - np.outer(first, first) / volume) / length**2
     required = np.concatenate(([volume], np.zeros(3), central[PAIRS]))
     softness = SOFTNESS * volume * (body.cloud.spacing / length) ** 4 / ENTRIES
-    return fitted_volumes(cells * (volume / cells.sum()), _powers(body.points, centre, length), required, softness)
+    return fit_volumes(cells * (volume / cells.sum()), _powers(body.points, centre, length), required, softness)
 
 
 @njit(cache=True)
@@ -150,7 +150,7 @@ def _powers(points, centre, length):
     return result
 
 
-def fitted_volumes(cells: Floats, powers: Floats, moments: Floats, softness: Floats) -> Floats:
+def fit_volumes(cells: Floats, powers: Floats, moments: Floats, softness: Floats) -> Floats:
     """Return volumes v exp(q) with given moments, q a polynomial; see the module.
 
     Args:

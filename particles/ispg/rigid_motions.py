@@ -107,7 +107,7 @@ def rigid_momenta(motions: Floats, masses: Floats, velocity: Floats) -> Floats:
     return motions.reshape(len(motions), velocity.size) @ (masses[:, None] * velocity).ravel()
 
 
-def orthonormal(motions: Floats, masses: Floats) -> Floats:
+def orthonormalise(motions: Floats, masses: Floats) -> Floats:
     """Return a mass-orthonormal basis of rigid-body motions, shape (k, n, 3) [1/sqrt(kg)].
 
     Args:

@@ -78,7 +78,7 @@ class GalerkinState:
         count = len(body.points)
         return cls(
             points=body.points,
-            centre=centre(body),
+            centre=find_centre(body),
             velocity=body.velocity,
             gradient=np.zeros((count, 3, 3)),
             kinetic=None,
@@ -136,7 +136,7 @@ class GalerkinState:
             admitted: Whether walls admit a translation along each axis, shape (3,).
         """
         change = projected(self.gradient, body.points - self.points)
-        body.points = body.points + np.where(admitted, self.centre - centre(body), 0.0)
+        body.points = body.points + np.where(admitted, self.centre - find_centre(body), 0.0)
         with_plates = constrained_part(projections, wall_velocities(body, self.plate_twists))
         velocity = projected(projections, self.velocity + change) + with_plates
         history = self.history.stopped(physics.pinned(body), wall_velocities(body, self.plate_displacements))
@@ -207,7 +207,7 @@ class Prediction:
         return self.prescribed | self.floating
 
 
-def centre(body: Body) -> Floats:
+def find_centre(body: Body) -> Floats:
     """Return the centre of volume of the liquid, shape (3,) [m]."""
     volume, first, _ = body_moments(body)
     return first / volume

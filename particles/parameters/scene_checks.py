@@ -4,10 +4,10 @@ from collections.abc import Callable
 from math import degrees, pi, radians
 from typing import Any, Protocol
 
-from reflowshock.parameters import changed
+from reflowshock.parameters import with_value
 from reflowshock.particles.parameters import checks
 from reflowshock.particles.parameters.checks import ROUNDING, deg, mm, mm3, too_many
-from reflowshock.particles.parameters.effects import acting_weight, decide_drop
+from reflowshock.particles.parameters.effects import LIQUID_EFFECTS, acting_weight, asymmetric_effect, decide_drop
 from reflowshock.particles.parameters.joint_checks import unverified_joint
 from reflowshock.particles.parameters.scenes import Drop, Drops, Joint, Oscillation
 from reflowshock.particles.parameters.solder import Solder
@@ -51,7 +51,7 @@ def with_scheme(scene: Drop | Joint | Drops, solder: Solder, asked: str) -> tupl
     """
     if asked != "auto":
         return solder, ""
-    ispg = changed(solder, "numerics.scheme", "ispg")
+    ispg = with_value(solder, "numerics.scheme", "ispg")
     if scene.needs_ispg:
         return ispg, "no other scheme computes it"
     feature = UNVERIFIED_FEATURES[type(scene)](scene, solder)
@@ -64,6 +64,7 @@ def drop_problems(drop: Drop, solder: Solder) -> list[Problem]:
     problems = problems or checks.ispg_problems(solder, _unverified_drop(drop, solder))
     problems = problems or _impact_problems(drop, solder)
     problems = problems or _resolution_problems(drop) or _symmetry_problems(drop, solder)
+    problems = problems or _asymmetry_problems(drop, solder)
     return problems or _wall_problems(drop) or free_problems(drop, solder)
 
 
@@ -247,7 +248,7 @@ def free_problems(scene: HasWall, solder: Solder) -> list[Problem]:
     """Find enabled effects that need a wall in a scene without one."""
     if not scene.is_free:
         return []
-    switches = {"gravity": solder.effects.gravity, "solder.effects.wall_adhesion": solder.effects.wall_adhesion}
+    switches = {effect.key: getattr(solder.effects, effect.name) for effect in LIQUID_EFFECTS if effect.needs_wall}
     message = "without a contact angle the scene has no wall: a free drop falls as a whole"
     return [Problem(key, message, switch, "auto, off") for key, switch in switches.items() if switch == "on"]
 
@@ -279,6 +280,18 @@ def _symmetry_problems(drop: Drop, solder: Solder) -> list[Problem]:
             "symmetry needs a drop that relaxes to rest, without inertia or viscosity, or the scheme ispg; not gripc"
         )
         return [Problem(key, message, drop.symmetry, "none")]
+    return []
+
+
+def _asymmetry_problems(drop: Drop, solder: Solder) -> list[Problem]:
+    """Find an effect that breaks the symmetry by which a drop is computed in part or in section."""
+    effects = decide_drop(solder, drop.is_free)
+    if (effect := asymmetric_effect(effects)) is None:
+        return []
+    for key, value in (("drop.symmetry", drop.symmetry), ("drop.section", drop.section)):
+        if value != "none":
+            message = f"{effect.name.replace('_', ' ')} breaks this symmetry: {effects[effect.name]['why']}"
+            return [Problem(key, message, value, f'none, or {effect.key} = "off"')]
     return []
 
 

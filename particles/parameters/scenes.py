@@ -14,11 +14,11 @@ from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.solder import (
     FlowEffects,
     FlowNumerics,
+    Process,
     Solder,
     SolderEffects,
     SolderNumerics,
     Switch,
-    Walls,
 )
 from reflowshock.particles.reference.drop_oscillation import rayleigh_frequency
 from reflowshock.quantity import Quantity
@@ -248,15 +248,13 @@ class Liquid(Parameters):
         return PROPERTIES[self.parameters] | overrides
 
 
-class Fluid(Liquid, Walls):
+class Fluid(Liquid, Process):
     """Molten solder with a named set of properties, whose values can be overridden individually.
 
     The set physical is SAC solder; the set paper has the values of Hu et al., with 10 times the surface tension and
     100 times the viscosity.
     """
 
-    gravity: Annotated[float, Quantity("m/s^2")] = Field(9.81, ge=0)
-    process_time: Annotated[float, Quantity("s")] = Field(60.0, gt=0)
     effects: FlowEffects = FlowEffects()
     numerics: FlowNumerics = FlowNumerics()
 
@@ -274,10 +272,7 @@ class Fluid(Liquid, Walls):
             del numerics["scheme"]
         return Solder(
             volume=scene.volume,
-            gravity=self.gravity,
-            process_time=self.process_time,
-            wall=self.wall,
-            slip_length=self.slip_length,
+            **{name: getattr(self, name) for name in Process.model_fields},
             effects=SolderEffects(gravity=gravity, **self.effects.model_dump()),
             numerics=SolderNumerics(spacing=scene.resolution, **numerics),
             **scene.contact_angles,

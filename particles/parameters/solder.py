@@ -68,13 +68,20 @@ class Walls(Parameters):
     slip_length: Annotated[float | None, Quantity("mm")] = Field(None, gt=0)
 
 
+class Process(Walls):
+    """Walls, gravity and process time, shared by the solder of packages and of scenes; parameters of effects."""
+
+    gravity: Annotated[float, Quantity("m/s^2")] = Field(9.81, ge=0)
+    process_time: Annotated[float, Quantity("s")] = Field(60.0, gt=0)
+
+
 class SolderEffects(FlowEffects):
     """Effects of a reflow: decided from dimensionless numbers (auto), or set by the user."""
 
     gravity: Switch = "auto"
 
 
-class Solder(Walls):
+class Solder(Process):
     """Molten solder: volume of one ball, fluid properties, contact angles and process."""
 
     volume: Annotated[float, Quantity("mm^3")] = Field(gt=0)
@@ -83,7 +90,5 @@ class Solder(Walls):
     viscosity: Annotated[float, Quantity("Pa*s")] = Field(2.27e-3, gt=0)
     pad_contact_angle: Annotated[float, Quantity("deg")] = Field(math.radians(5.0), gt=0, lt=3.14159265)
     mask_contact_angle: Annotated[float, Quantity("deg")] = Field(math.radians(148.0), gt=0, lt=3.14159265)
-    gravity: Annotated[float, Quantity("m/s^2")] = Field(9.81, ge=0)
-    process_time: Annotated[float, Quantity("s")] = Field(60.0, gt=0)
     effects: SolderEffects = SolderEffects()
     numerics: SolderNumerics = SolderNumerics()

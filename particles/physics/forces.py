@@ -23,7 +23,7 @@ from reflowshock.particles.core.surface_measure import (
 from reflowshock.particles.core.symmetry import fold
 from reflowshock.particles.discretisation.discretisation import Discretisation
 from reflowshock.particles.parameters.solder import Solder
-from reflowshock.particles.physics.physics import Force, Physics
+from reflowshock.particles.physics.physics import BodyForce, Force, Physics
 from reflowshock.particles.surface.contact_line import ContactLine
 
 
@@ -58,7 +58,7 @@ class SurfaceTension:
 
 
 @dataclass(frozen=True, slots=True)
-class Gravity:
+class Gravity(BodyForce):
     """Gravity as the potential energy of the volume inside the tracked surface.
 
     Weights m g of the particles would make the equilibrium depend on the interior operator (1 % error in height).
@@ -89,6 +89,10 @@ class Gravity:
         energy, so that a flat film never comes to rest.
         """
         return -self.weight * self._potential(body)[1]
+
+    def hydrostatic_pressure(self, points: Floats) -> Floats:
+        """Return the pressure -rho g z, zero at the height of the origin, shape (n,) [Pa]."""
+        return -self.weight * points[:, 2]
 
     def _potential(self, body: Body) -> tuple[float, Floats]:
         """Return the integral of z over the body [m^4] and its gradient, shape (n, 3) [m^3]."""

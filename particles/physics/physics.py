@@ -1,5 +1,6 @@
 """Physics of a liquid body: forces, operators, events and constraints of the active effects."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -26,6 +27,16 @@ class Force(Protocol):
 
     def force(self, body: Body) -> Floats:
         """Return the force -dE/dx, shape (n, 3) [N]: the exact negative gradient of ``energy``."""
+
+
+class BodyForce(ABC):
+    """Force on the volume of the liquid, applied as an equal load on its surface."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def hydrostatic_pressure(self, points: Floats) -> Floats:
+        """Return the pressure whose gradient balances the force, which the solver does not see, shape (n,) [Pa]."""
 
 
 class Operator(Protocol):
@@ -75,6 +86,7 @@ class Physics:
         motions: Motions of the moving plates.
         frictions: Operators on the velocities relative to the plates.
         holds: Further constraints that pin particles to their plates.
+        is_axisymmetric: Whether the effects keep the axis of a drop.
     """
 
     forces: Sequence[Force]
@@ -85,6 +97,7 @@ class Physics:
     motions: Sequence[PlateMotion] = ()
     frictions: Sequence[Operator] = ()
     holds: Sequence[Hold] = ()
+    is_axisymmetric: bool = True
 
     def force(self, body: Body) -> Floats:
         """Return the sum of the forces, shape (n, 3) [N]."""
@@ -117,7 +130,7 @@ class Physics:
 
 
 class Acting(Protocol):
-    """Class that implements an effect; ``place`` in ``parameters/effects.py`` names it."""
+    """Class that implements an effect; ``LiquidEffect.implementation`` names it."""
 
     @classmethod
     def added_to(cls, physics: Physics, solder: Solder) -> Physics:

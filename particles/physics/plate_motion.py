@@ -31,7 +31,7 @@ class PlateMotion(Protocol):
     def load(self) -> Floats:
         """External force at the origin of the plate, shape (3,) [N]."""
 
-    def given(self, plate: Plate, time_step: float) -> Floats:
+    def prescribed_twist(self, plate: Plate, time_step: float) -> Floats:
         """Return the prescribed twist over the next time step [s], shape (6,) [m/s, rad/s]."""
 
     def after_split(self, wall: int) -> "PlateMotion | None":
@@ -64,7 +64,7 @@ class Travel:
         """External force: zero, shape (3,) [N]."""
         return np.zeros(3)
 
-    def given(self, plate: Plate, time_step: float) -> Floats:
+    def prescribed_twist(self, plate: Plate, time_step: float) -> Floats:
         """Return the twist towards the target, shape (6,) [m/s, rad/s]."""
         return plate.motion_to(self.target) / max(time_step, self.duration(plate))
 
@@ -92,7 +92,7 @@ class Floating:
     directions: Floats
     load: Floats
 
-    def given(self, _plate: Plate, _time_step: float) -> Floats:
+    def prescribed_twist(self, _plate: Plate, _time_step: float) -> Floats:
         """Return the prescribed twist, which is zero, shape (6,) [m/s, rad/s]."""
         return np.zeros(6)
 

@@ -23,7 +23,7 @@ from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.heat import Heat, enthalpy_at
 from reflowshock.particles.sph.liquid_surface import LiquidSurface
 from reflowshock.particles.sph.simulation import Simulation
-from reflowshock.particles.sph.smoothing import SUPPORT, beyond_plane
+from reflowshock.particles.sph.smoothing import SUPPORT, share_beyond_plane
 from reflowshock.particles.sph_flows.droplet import liquid_of
 from reflowshock.particles.surface.cloud_level_set import with_mirror_image
 from reflowshock.particles.surface.level_set import LevelSet, signed_distance_in_band
@@ -100,7 +100,7 @@ class Deposit:
         self.start = points, surface, spacing
         self.law, tension = liquid_of(drop, spacing)
         self.ground = empty_ground(self.scene, spacing)
-        self.fields = flow.liquid_and_walls(np.empty((3, 0)), np.empty((3, 0)), np.empty(0), self.law)
+        self.fields = flow.make_fields(np.empty((3, 0)), np.empty((3, 0)), np.empty(0), self.law)
         mesh = SurfaceMesh(np.empty((0, 3)), np.empty((0, 3), np.int32), self.law.spacing, bool(self.law.mirror))
         self.surface = LiquidSurface(mesh, Capillarity(tension, cos(drop.angle), self.law))
 
@@ -156,7 +156,7 @@ class Deposit:
         (start, (corners, triangles), _), drop = self.start, self.scene.drop
         shift = np.array([*position, self._height(position) - 0.5 * drop.diameter - 0.5 * EDGE * drop.spacing])
         still = np.zeros(start.shape[1])
-        new = flow.liquid_and_walls(start + shift[:, None], np.empty((3, 0)), still, self.law)
+        new = flow.make_fields(start + shift[:, None], np.empty((3, 0)), still, self.law)
         for speed, value in zip(new[3:6], self.scene.velocity, strict=True):
             speed[:] = value
         self.fields = Fields(*(np.concatenate(pair) for pair in zip(self.fields, new, strict=True)))
@@ -195,7 +195,7 @@ class Deposit:
         walls, viscosity = np.zeros((5, len(held) + len(near))), np.zeros(len(self.order))
         fields = Fields(*[*(values[self.order] for values in self.fields[:12]), *walls, viscosity])
         depth = -self.ground.at(self.points[near], 1) / self.law.length
-        fields.wall_room[len(held) :] = beyond_plane(self.law.kernel, np.maximum(depth, 0.0))
+        fields.wall_room[len(held) :] = share_beyond_plane(self.law.kernel, np.maximum(depth, 0.0))
         self.surface.lie_on(self.ground if self.bodies else None)
         self.simulation = Simulation(
             fields, len(liquid), self.law, self.surface, flow.device_of(self.scene), len(held)

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from math import exp, pi
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
 from reflowshock.arrays import Floats
 
@@ -44,6 +43,8 @@ def steady_channel(height: Floats, width: float, rate_at_wall: float, viscosity:
         rate_at_wall: Shear rate at the plates [1/s].
         viscosity: Function from shear rate [1/s] to viscosity [Pa s].
     """
+    from scipy.integrate import cumulative_trapezoid  # imported late to keep the start-up of plans fast
+
     rates = np.linspace(0.0, rate_at_wall, POINTS)
     stress = np.array([viscosity(rate) * rate for rate in rates])
     offset = 0.5 * width * stress / stress[-1]  # from the centre line

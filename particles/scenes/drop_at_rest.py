@@ -11,7 +11,7 @@ import numpy as np
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.cloud import Cloud, box_cloud, free_box_cloud
 from reflowshock.particles.core.symmetry import cut
-from reflowshock.particles.parameters.effects import LIQUID_EFFECTS, Decision, acting_weight, decide_drop, switched
+from reflowshock.particles.parameters.effects import Decision, decide_drop, reference_weight, switched
 from reflowshock.particles.parameters.scenes import Drop
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.reference.young_laplace import Meridian, sessile_meridian, sessile_section, sphere_meridian
@@ -25,7 +25,7 @@ from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape
 from reflowshock.particles.surface.contact_line import ContactLine
 from reflowshock.particles.surface.hysteresis import FrictionLine, HystereticLine
-from reflowshock.particles.surface.profile import width
+from reflowshock.particles.surface.profile import mean_width
 
 ANGLE_OF_CUBE = 0.5 * np.pi
 # Contact angle of the initial cap of an impact: at 160 degrees particles slip out between surface and wall.
@@ -71,7 +71,8 @@ def drop_to_rest(
     # With hysteresis an oscillation ends at any angle between the receding and the advancing one.
     is_arbitrary = drop.hysteresis is not None and effects["inertia"]["on"]
     is_known = drop.is_free or (effects["wall_adhesion"]["on"] and not is_arbitrary)
-    reference = _reference(drop, solder, acting_weight(solder, effects)) if is_known else None
+    weight = reference_weight(solder, effects)
+    reference = _reference(drop, solder, weight) if is_known and weight is not None else None
     metrics = body_metrics(solder, reference, flow, run)
     shape = collect_shape(solder, flow, run, metrics | _excess(drop, metrics) | _spread(drop, run))
     surface = flow.body.narrow() if isinstance(flow.body, Section) else flow.body
@@ -114,7 +115,7 @@ def _touching(cloud: Cloud, solder: Solder) -> Cloud:
     """Deform a cube on a wall into a sphere that just touches the wall."""
     numerics = solder.numerics.model_copy(update={"scheme": "energy", "time_step_limit": TOUCHING_STEP})
     still = solder.model_copy(update={"numerics": numerics, "pad_contact_angle": TOUCHING_ANGLE})
-    acting = {effect.name: effect.name in ("surface_tension", "wall_adhesion") for effect in LIQUID_EFFECTS}
+    acting = {"surface_tension": True, "wall_adhesion": True}
     flow = start_flow(cloud, still, acting, (contact_line(cloud, 0, np.inf, still),))
     run_to_rest(flow, stop_rule(cloud, still, acting))
     return replace(cloud, points=flow.body.points, triangles=flow.body.triangles)
@@ -124,7 +125,7 @@ def _spread(drop: Drop, run: Run) -> Metrics:
     """Return the largest width of an impacting drop over its diameter, and its time."""
     if drop.speed is None:
         return {}
-    widths = [width(snapshot.points) for snapshot in run.snapshots]
+    widths = [mean_width(snapshot.points) for snapshot in run.snapshots]
     widest = int(np.argmax(widths))
     return {"spread_max": (widths[widest] / drop.diameter, ""), "time_of_spread_max": (run.snapshots[widest].time, "s")}
 

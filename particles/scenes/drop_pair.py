@@ -10,7 +10,7 @@ import numpy as np
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.cloud import Cloud, box_cloud, sphere_cloud
 from reflowshock.particles.core.surface_measure import centre_of_volume
-from reflowshock.particles.parameters.effects import Decision, acting_weight, decide_drop, switched
+from reflowshock.particles.parameters.effects import Decision, decide_drop, reference_weight, switched
 from reflowshock.particles.parameters.scenes import Drops
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.reference.young_laplace import Meridian, sphere_meridian
@@ -19,7 +19,7 @@ from reflowshock.particles.scenes.flow_setup import contact_line, start_flow, st
 from reflowshock.particles.scenes.metrics import Metrics, body_metrics, particle_pressure, reference_drop
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run
-from reflowshock.particles.steps.shape import JointShape, Snapshot, concatenated, shifted_indices
+from reflowshock.particles.steps.shape import JointShape, Snapshot, concatenate_shapes, shifted_indices
 from reflowshock.particles.surface.profile import fit_profile
 
 WORST = ("_error", "_drift", "_scatter", "_at_rest")
@@ -102,23 +102,23 @@ def _volume(scene: Drops, drop: MovingDrop) -> float:
     return sum(scene.volumes[origin] for origin in drop.origins)
 
 
-def _reference(scene: Drops, solder: Solder, effects: Mapping[str, Decision], drop: MovingDrop) -> Meridian:
+def _reference(scene: Drops, solder: Solder, effects: Mapping[str, Decision], drop: MovingDrop) -> Meridian | None:
     """Return the exact meridian of one of the remaining drops."""
     volume = _volume(scene, drop)
     if scene.is_free:
         return sphere_meridian(volume, solder.surface_tension)
     drop_solder = solder.model_copy(update={"volume": volume})
-    return reference_drop(drop_solder, inf, acting_weight(solder, effects))
+    return reference_drop(drop_solder, inf, reference_weight(solder, effects))
 
 
-def _drop_metrics(scene: Drops, solder: Solder, drop: MovingDrop, reference: Meridian) -> Metrics:
+def _drop_metrics(scene: Drops, solder: Solder, drop: MovingDrop, reference: Meridian | None) -> Metrics:
     """Return the metrics of one of the remaining drops, for a sphere with the largest relative error of a radius."""
     body = drop.flow.body
     profile = fit_profile(body.points, body.triangles, body.span())
     run = Run(records=drop.records, profiles=[profile], seconds=drop.seconds, calm=drop.calm, at_rest=drop.at_rest)
     drop_solder = solder.model_copy(update={"volume": _volume(scene, drop)})
     metrics = body_metrics(drop_solder, reference, drop.flow, run)
-    if not scene.is_free:
+    if not scene.is_free or reference is None:
         return metrics
     surface = body.points[: body.cloud.surface_count]
     radius = np.linalg.norm(surface - centre_of_volume(surface, body.triangles), axis=1)
@@ -138,11 +138,11 @@ def _shape(drops: Sequence[MovingDrop], metrics: Metrics, capillary: float) -> J
     """Combine the remaining drops in one shape, with the history of the first; ``capillary`` is mu / gamma."""
     bodies = [drop.flow.body for drop in drops]
     counts = [body.cloud.surface_count for body in bodies]
-    points = concatenated([body.points for body in bodies], counts)
+    points = concatenate_shapes([body.points for body in bodies], counts)
     return JointShape(
         points=points,
-        velocity=concatenated([body.velocity for body in bodies], counts),
-        pressure=concatenated([particle_pressure(drop.flow) for drop in drops], counts),
+        velocity=concatenate_shapes([body.velocity for body in bodies], counts),
+        pressure=concatenate_shapes([particle_pressure(drop.flow) for drop in drops], counts),
         surface_points=points[: sum(counts)],
         triangles=np.concatenate(shifted_indices([body.triangles for body in bodies], counts)),
         rings=(),

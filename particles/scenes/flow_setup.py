@@ -1,5 +1,7 @@
 """Set-up of a liquid flow from its particles: contact lines, active effects, step solver, time step and stop rule."""
 
+from collections.abc import Mapping
+from dataclasses import replace
 from math import pi
 from pkgutil import resolve_name
 
@@ -9,7 +11,7 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import Cloud
 from reflowshock.particles.core.plate import Pad
 from reflowshock.particles.core.symmetry import whole_line
-from reflowshock.particles.parameters.effects import LIQUID_EFFECTS
+from reflowshock.particles.parameters.effects import acting
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.operators import Mass
 from reflowshock.particles.physics.physics import Acting, Physics
@@ -22,13 +24,13 @@ from reflowshock.particles.surface.contact_line import ContactLine
 CALM_CAPILLARY_TIMES = 20.0
 
 
-def start_flow(cloud: Cloud, solder: Solder, effects: dict[str, bool], lines: tuple[ContactLine, ...]) -> LiquidFlow:
+def start_flow(cloud: Cloud, solder: Solder, effects: Mapping[str, bool], lines: tuple[ContactLine, ...]) -> LiquidFlow:
     """Set up the flow of a liquid at rest, with only the active effects.
 
     Args:
         cloud: Particles of the liquid.
         solder: Fluid properties and numerics.
-        effects: Name of each effect -> on or off.
+        effects: Name -> on or off; missing effects are off.
         lines: Contact lines, one per ring of the cloud.
     """
     largest, bound = largest_step(solder, cloud.spacing)
@@ -37,19 +39,24 @@ def start_flow(cloud: Cloud, solder: Solder, effects: dict[str, bool], lines: tu
     return LiquidFlow(Body.at_rest(cloud), physics, time_step, solver)
 
 
-def build_physics(solder: Solder, effects: dict[str, bool], lines: tuple[ContactLine, ...]) -> Physics:
+def build_physics(
+    solder: Solder, effects: Mapping[str, bool], lines: tuple[ContactLine, ...], in_section: bool = False
+) -> Physics:
     """Return the physics of the active effects.
 
     Args:
         solder: Fluid properties.
-        effects: Name of each effect -> on or off, as decided by ``decide_effects``.
+        effects: Name -> on or off, as decided by ``decide_effects``; missing effects are off.
         lines: Contact lines.
+        in_section: Whether the liquid is a drop in section, whose surface is a polyline.
     """
     physics = Physics((), (Mass(solder.density),), (), (), lines)
-    for effect in LIQUID_EFFECTS:
-        if effects[effect.name]:
-            acting: type[Acting] = resolve_name(effect.implementation)
-            physics = acting.added_to(physics, solder)
+    for effect in acting(effects):
+        section_name = effect.section_implementation if in_section else ""
+        acting_class: type[Acting] = resolve_name(section_name or effect.implementation)
+        physics = acting_class.added_to(physics, solder)
+        if not effect.is_axisymmetric:
+            physics = replace(physics, is_axisymmetric=False)
     return physics
 
 
@@ -78,18 +85,18 @@ def pad_lines(cloud: Cloud, solder: Solder) -> tuple[ContactLine, ...]:
     return tuple(lines)
 
 
-def stop_rule(cloud: Cloud, solder: Solder, effects: dict[str, bool], angle: float | None = 0.5 * pi) -> StopRule:
+def stop_rule(cloud: Cloud, solder: Solder, effects: Mapping[str, bool], angle: float | None = 0.5 * pi) -> StopRule:
     """Return the rule that ends a flow: at rest, or with inertia at the end of the process at the latest.
 
     Args:
         cloud: Particles of the liquid.
         solder: Fluid, process and numerics.
-        effects: Name of each effect -> on or off.
+        effects: Name -> on or off; missing effects are off.
         angle: Contact angle of the spherical cap that oscillates as slowly as the body [rad]: the contact angle of a
             drop on a uniform wall; the default for a body that edges or friction hold; None for a free drop.
     """
     calm_time = CALM_CAPILLARY_TIMES * capillary_limit(solder.density, cloud.spacing, solder.surface_tension)
     steps, tolerance = most_steps(solder, cloud.spacing), solder.numerics.tolerance
-    if not effects["inertia"]:
+    if not effects.get("inertia", False):
         return StopRule(steps, tolerance, calm_time)
     return StopRule(steps, tolerance, calm_time, solder.process_time, 0.25 * swing_period(solder, angle))

@@ -16,6 +16,7 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.cloud import sphere_cloud
 from reflowshock.particles.ispg.ispg_step import IspgStep
+from reflowshock.particles.parameters.effects import decide_oscillation, switched
 from reflowshock.particles.parameters.scenes import Oscillation, rayleigh_period
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.physics import Physics
@@ -37,7 +38,6 @@ METRICS = (
     "particles",
     "particle_steps_per_second",
 )
-EFFECTS = {"surface_tension": True, "gravity": False, "wall_adhesion": False, "inertia": True}
 COLUMNS = ("time", "amplitude", "energy", "kinetic_energy", "volume", "momentum")
 # Steps that relax the initial polyhedron, whose vertices at rest are not exactly on a sphere; the size of a step is in
 # radians of the second mode.
@@ -192,7 +192,8 @@ def _radius(solder: Solder) -> float:
 
 def _physics(solder: Solder) -> Physics:
     """Build the physics of a free drop."""
-    return build_physics(solder, EFFECTS | {"viscosity": solder.effects.viscosity != "off"}, ())
+    effects = switched(decide_oscillation(solder))
+    return build_physics(solder, effects | {"viscosity": solder.effects.viscosity != "off"}, ())
 
 
 def _sample(flow: InertialFlow, solder: Solder, time: float) -> tuple[float, ...]:

@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.geometry import JointGeometry
-from reflowshock.particles.parameters.effects import Decision, acting_weight, decide_effects
+from reflowshock.particles.parameters.effects import Decision, decide_effects, reference_weight
 from reflowshock.particles.parameters.scenes import FloatingPackage, Joint
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.plate_motion import LIFT, SHIFT, TURN, Floating
@@ -64,7 +64,7 @@ def joint_to_rest(
         SolveFailed: A linear solve failed.
     """
     effects = decide_effects(joint.geometry, solder)
-    weight = acting_weight(solder, effects)
+    weight = reference_weight(solder, effects)
     if joint.path is not None:
         shapes = _along(joint, solder, progress, checkpoints)
         geometries = [joint.geometry, *joint.path_geometries][: len(shapes)]
@@ -112,7 +112,7 @@ def _along(
     return shapes
 
 
-def _with_exact_pull(shape: JointShape, joint: Joint, solder: Solder, weight: float) -> JointShape:
+def _with_exact_pull(shape: JointShape, joint: Joint, solder: Solder, weight: float | None) -> JointShape:
     """Add ``pull_exact`` [N] to the history: the Young-Laplace force of a vertical path, NaN for other paths."""
     if "standoff" not in shape.history:
         return shape
@@ -126,7 +126,7 @@ def _with_exact_pull(shape: JointShape, joint: Joint, solder: Solder, weight: fl
     return replace(shape, history=shape.history | {"pull_exact": pull})
 
 
-def _balance(joint: Joint, solder: Solder, weight: float, shape: JointShape) -> Metrics:
+def _balance(joint: Joint, solder: Solder, weight: float | None, shape: JointShape) -> Metrics:
     """Return the errors of a package that floats freely in height.
 
     The axial force is compared with the load, over pi gamma times the smaller pad radius, and the height with the
@@ -144,13 +144,13 @@ def _balance(joint: Joint, solder: Solder, weight: float, shape: JointShape) -> 
     return balance
 
 
-def collapse_height(joint: Joint, solder: Solder, weight: float, near: float) -> float:
+def collapse_height(joint: Joint, solder: Solder, weight: float | None, near: float) -> float:
     """Return the standoff at which the Young-Laplace joint carries the load of the package [m].
 
     Args:
         joint: Volume, pads and package.
         solder: Fluid properties.
-        weight: Specific weight rho g [N/m^3].
+        weight: Specific weight rho g [N/m^3]; None if the shape is not axisymmetric.
         near: Guess of the standoff [m].
 
     Returns:

@@ -18,7 +18,7 @@ from reflowshock.particles.ispg.energy_budget import total_losses
 from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.forces import Gravity, Wetting
-from reflowshock.particles.physics.physics import Force, plate_wrench
+from reflowshock.particles.physics.physics import BodyForce, Force, plate_wrench
 from reflowshock.particles.reference.shape_error import shape_error
 from reflowshock.particles.reference.young_laplace import Meridian, NoMeridian, joint_meridian, pad_meridian
 from reflowshock.particles.steps.flow import LiquidFlow
@@ -41,10 +41,10 @@ JOINT_NAMES = {
 
 def joint_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
     """Return the metrics of a joint at the end of its run, with errors against the reference of its geometry."""
-    reference = reference_meridian(geometry, solder, _weight(flow))
+    reference = reference_meridian(geometry, solder, _reference_weight(flow))
     errors = _joint_errors(solder, flow, run, reference) | _width_error(geometry, solder, flow, run)
     shape = _joint_shape(geometry, solder, flow, run) | errors
-    rest = _cost_and_rest(solder, flow, run) | ledger([flow])
+    rest = _cost_and_rest(solder, flow, run) | energy_metrics([flow])
     return _volume(solder, flow) | shape | _pressure(solder, flow, run, reference) | rest
 
 
@@ -57,7 +57,7 @@ def drop_metrics(solder: Solder, pad_radius: float, flow: LiquidFlow, run: Run) 
         flow: Flow at the end of the run.
         run: Records of the run.
     """
-    return body_metrics(solder, reference_drop(solder, pad_radius, _weight(flow)), flow, run)
+    return body_metrics(solder, reference_drop(solder, pad_radius, _reference_weight(flow)), flow, run)
 
 
 def body_metrics(solder: Solder, reference: Meridian | None, flow: LiquidFlow, run: Run) -> Metrics:
@@ -70,7 +70,7 @@ def body_metrics(solder: Solder, reference: Meridian | None, flow: LiquidFlow, r
         shape["max_width_error"] = (width / reference.max_width - 1.0, "")
     if flow.physics.lines:
         shape |= _contact(solder, flow, reference)
-    rest = _cost_and_rest(solder, flow, run) | ledger([flow])
+    rest = _cost_and_rest(solder, flow, run) | energy_metrics([flow])
     return _volume(solder, flow) | shape | _pressure(solder, flow, run, reference) | rest
 
 
@@ -113,10 +113,12 @@ def drop_errors(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
     The result is empty for a pendant drop with weight, which has no reference.
     """
     body, plate, pad = flow.body, flow.body.plates[0], flow.physics.lines[0].pads[0]
-    volume, weight = body.volume()[0], _weight(flow)
+    volume, weight = body.volume()[0], _reference_weight(flow)
     if weight and plate.side > 0.0:
         return {}
     exact = reference_drop(solder.model_copy(update={"volume": volume}), pad.radius, weight)
+    if exact is None:
+        return {}
     upright = plate.local(body.points[: body.cloud.surface_count]) * np.array([1.0, 1.0, -plate.side])
     error = shape_error(upright, body.triangles, exact) / float(np.cbrt(volume))
     height = run.records[-1].height / exact.height - 1.0
@@ -145,13 +147,22 @@ def _weight(flow: LiquidFlow) -> float:
     return sum(force.weight for force in flow.physics.forces if isinstance(force, Gravity))
 
 
+def _reference_weight(flow: LiquidFlow) -> float | None:
+    """Return the specific weight of the Young-Laplace reference [N/m^3]; None if the shape is not axisymmetric."""
+    return _weight(flow) if flow.physics.is_axisymmetric else None
+
+
 def particle_pressure(flow: LiquidFlow) -> Floats:
     """Return the pressure of the particles above ambient, including the hydrostatic part, shape (n,) [Pa].
 
     Gravity acts as a surface force, so the pressure of the solver lacks the hydrostatic part.
     """
     body = flow.body.whole()
-    return body.pressure - _weight(flow) * body.points[:, 2]
+    pressure = body.pressure
+    for force in flow.physics.forces:
+        if isinstance(force, BodyForce):
+            pressure = pressure + force.hydrostatic_pressure(body.points)
+    return pressure
 
 
 def contact_radius(body: Body, wall: int) -> float:
@@ -224,7 +235,7 @@ def _width_error(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run:
     bound, error = width_change_bound(geometry), float("nan")
     if bound <= LARGEST_WIDTH_CHANGE:
         upright = replace(geometry, offset=(0.0, 0.0), tilt=(0.0, 0.0))
-        reference = reference_meridian(upright, solder, _weight(flow))
+        reference = reference_meridian(upright, solder, _reference_weight(flow))
         if reference is not None:
             error = run.profiles[-1].max_width / reference.max_width - 1.0
     return {"width_error": (error, ""), "width_reference_error": (bound, "")}
@@ -290,10 +301,11 @@ def particles_lost(body: Body) -> int:
     return int((winding_numbers.at_points(below, np.concatenate(corners)) < 0.5).sum())
 
 
-def ledger(flows: Sequence[LiquidFlow]) -> Metrics:
-    """Return the energy losses of the scheme ispg in all bodies over the initial energy, and the imbalance.
+def energy_metrics(flows: Sequence[LiquidFlow]) -> Metrics:
+    """Return the metrics of the energy budget: losses by cause over the initial energy, and the imbalance.
 
-    The sliding speed of a body is included, since a body may slide on smooth walls for ever.
+    The result is empty for schemes without a budget, that is all but ispg. It includes the sliding speed, since a body
+    may slide on smooth walls for ever.
     """
     moved = [(flow, flow.solver.state, flow.solver.first_energy) for flow in flows if isinstance(flow.solver, IspgStep)]
     started = [(flow, state, first) for flow, state, first in moved if state is not None]
@@ -308,7 +320,7 @@ def ledger(flows: Sequence[LiquidFlow]) -> Metrics:
 
 
 def width_change_bound(geometry: JointGeometry) -> float:
-    """Bound on the relative change of a joint's width, at equal gap, by the package's offset and tilt.
+    """Return a bound on the relative change of a joint's width by offset and tilt of the package, at equal gap.
 
     By symmetry the change is of second order. The factors bound barrels and hourglasses of equal discs, 1.2 to 2.1
     radii apart, to 0.3 radii and 5 deg; widths of Surface Evolver keep to them (test_particles_leaning_joints.py).
@@ -318,18 +330,18 @@ def width_change_bound(geometry: JointGeometry) -> float:
     return WIDTH_CHANGE * lean**2
 
 
-def reference_meridian(geometry: JointGeometry, solder: Solder, weight: float) -> Meridian | None:
+def reference_meridian(geometry: JointGeometry, solder: Solder, weight: float | None) -> Meridian | None:
     """Return the Young-Laplace meridian of a coaxial joint with Gibbs' condition at the pad edges.
 
     Args:
         geometry: Gap and pad radii.
         solder: Volume, surface tension and contact angles.
-        weight: Specific weight [N/m^3].
+        weight: Specific weight [N/m^3]; None if the shape is not axisymmetric.
 
     Returns:
-        Meridian; None if the joint is not coaxial or has no equilibrium.
+        Meridian; None without a weight, if the joint is not coaxial, or if it has no equilibrium.
     """
-    if not geometry.is_coaxial:
+    if weight is None or not geometry.is_coaxial:
         return None
     try:
         return joint_meridian(
@@ -345,7 +357,18 @@ def reference_meridian(geometry: JointGeometry, solder: Solder, weight: float) -
         return None
 
 
-def reference_drop(solder: Solder, pad_radius: float, weight: float) -> Meridian:
-    """Young-Laplace meridian of a drop on a pad in the mask, with Gibbs' condition at the pad's edge."""
+def reference_drop(solder: Solder, pad_radius: float, weight: float | None) -> Meridian | None:
+    """Return the Young-Laplace meridian of a drop on a pad in the mask, with Gibbs' condition at the pad's edge.
+
+    Args:
+        solder: Volume, surface tension and contact angles.
+        pad_radius: Radius of the pad [m], infinite for a uniform wall.
+        weight: Specific weight [N/m^3]; None if the shape is not axisymmetric.
+
+    Returns:
+        Meridian; None without a weight.
+    """
+    if weight is None:
+        return None
     limits = (solder.pad_contact_angle, solder.mask_contact_angle)
     return pad_meridian(solder.volume, pad_radius, solder.surface_tension, weight, angle_limits=limits)

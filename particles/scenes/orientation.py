@@ -76,7 +76,7 @@ def sizes(geometry: JointGeometry) -> Floats:
     return np.array([*discs, *geometry.offset, geometry.tilt[1] * geometry.radius_package])
 
 
-def oriented(shape: JointShape, orientation: Orientation) -> JointShape:
+def orient(shape: JointShape, orientation: Orientation) -> JointShape:
     """Transform the shape of a canonical joint to an orientation."""
     if orientation == Orientation():
         return shape

@@ -47,12 +47,12 @@ def _write_shape(group: h5py.Group, shape: JointShape) -> None:
         subgroup = group.create_group(f"snapshots/{number:04d}")
         subgroup.attrs["time"] = snapshot.time
         subgroup["points"], subgroup["triangles"] = snapshot.points, snapshot.triangles
-    for name, (value, unit) in untimed(shape.metrics).items():
+    for name, (value, unit) in remove_timings(shape.metrics).items():
         subgroup = group.create_group(f"metrics/{name}")
         subgroup.attrs["value"], subgroup.attrs["unit"] = value, unit
 
 
-def untimed(metrics: Mapping[str, tuple]) -> dict[str, tuple]:
+def remove_timings(metrics: Mapping[str, tuple]) -> dict[str, tuple]:
     """Return the metrics without timings, which are equal on all machines."""
     return {name: metric for name, metric in metrics.items() if name not in TIMES}
 
@@ -122,7 +122,7 @@ def write_flow(folder: Path, result: FlowResult) -> None:
             subgroup.attrs["time"] = picture.time
             for name in ("points", "velocity", "pressure"):
                 subgroup[name] = getattr(picture, name)
-        for name, (value, unit) in untimed(result.metrics).items():
+        for name, (value, unit) in remove_timings(result.metrics).items():
             subgroup = file.create_group(f"metrics/{name}")
             subgroup.attrs["value"], subgroup.attrs["unit"] = value, unit
     end = result.pictures[-1]

@@ -21,12 +21,12 @@ from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.ispg.motion_transfer import MovingBody, transfer_motion
 from reflowshock.particles.ispg.nodal_volumes import body_moments
 from reflowshock.particles.parameters.solder import Solder
-from reflowshock.particles.scenes.metrics import Metrics, drop_errors, ledger, particle_pressure, particles_lost
+from reflowshock.particles.scenes.metrics import Metrics, drop_errors, energy_metrics, particle_pressure, particles_lost
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
-from reflowshock.particles.steps.shape import JointShape, concatenated, shifted_indices
+from reflowshock.particles.steps.shape import JointShape, concatenate_shapes, shifted_indices
 from reflowshock.particles.surface.cloud_level_set import CannotRebuild, boundary_loops, cloud_from_level_set, with_lids
-from reflowshock.particles.surface.level_set import LevelSet, depths, signed_distance, smooth_union
+from reflowshock.particles.surface.level_set import LevelSet, measure_depths, signed_distance, smooth_union
 from reflowshock.particles.surface.morphological_closing import smooth_slits
 from reflowshock.particles.surface.profile import Profile, fit_profile
 
@@ -39,7 +39,7 @@ LOWEST_QUALITY = 0.25
 # A neck closer to a plate leaves a drop too thin for particles.
 FEWEST_SPACINGS = 2.0
 JOINT_METRICS = ("volume", "volume_drift", "standoff", "steps", "seconds", "time_step_over_capillary_limit")
-Flowed = tuple[LiquidFlow, Run]
+FlowAndRun = tuple[LiquidFlow, Run]
 
 
 def touch(first: Body, second: Body) -> bool:
@@ -52,7 +52,7 @@ def touch(first: Body, second: Body) -> bool:
 
 def overlap(first: Body, second: Body) -> float:
     """Return the largest depth of particles of the second body inside the first [m]; negative if all are outside."""
-    return float(depths(second.points, *closed_surface(first)).max())
+    return float(measure_depths(second.points, *closed_surface(first)).max())
 
 
 def collapsing(body: Body) -> bool:
@@ -197,7 +197,7 @@ def _common_velocity(body: Body, parts: Sequence[Body]) -> Floats:
     return new
 
 
-def split_to_rest(flow: LiquidFlow, rule: StopRule, start: Callable[[Body], LiquidFlow]) -> list[Flowed]:
+def split_to_rest(flow: LiquidFlow, rule: StopRule, start: Callable[[Body], LiquidFlow]) -> list[FlowAndRun]:
     """Cut a body between two horizontal plates at its neck and compute both drops at rest.
 
     Args:
@@ -241,7 +241,7 @@ def _cut(body: Body, walls: tuple[Plate, ...], neck: float, below: float) -> tup
     )
 
 
-def parted_shape(joint: JointShape, solder: Solder, drops: Sequence[Flowed]) -> JointShape:
+def split_shape(joint: JointShape, solder: Solder, drops: Sequence[FlowAndRun]) -> JointShape:
     """Return the shape of an open joint: both drops at rest, with the history until the neck collapsed.
 
     Args:
@@ -251,13 +251,13 @@ def parted_shape(joint: JointShape, solder: Solder, drops: Sequence[Flowed]) -> 
     """
     bodies = [flow.body for flow, _ in drops]
     counts = [body.cloud.surface_count for body in bodies]
-    points = concatenated([body.points for body in bodies], counts)
+    points = concatenate_shapes([body.points for body in bodies], counts)
     metrics = {name: number for name, number in joint.metrics.items() if name in JOINT_METRICS}
     return replace(
         joint,
         points=points,
-        velocity=concatenated([body.velocity for body in bodies], counts),
-        pressure=concatenated([particle_pressure(flow) for flow, _ in drops], counts),
+        velocity=concatenate_shapes([body.velocity for body in bodies], counts),
+        pressure=concatenate_shapes([particle_pressure(flow) for flow, _ in drops], counts),
         surface_points=points[: sum(counts)],
         triangles=np.concatenate(shifted_indices([body.triangles for body in bodies], counts)),
         rings=tuple(shifted_indices([body.cloud.rings[0] for body in bodies], counts)),
@@ -265,9 +265,9 @@ def parted_shape(joint: JointShape, solder: Solder, drops: Sequence[Flowed]) -> 
     )
 
 
-def _drop_metrics(solder: Solder, drops: Sequence[Flowed]) -> Metrics:
+def _drop_metrics(solder: Solder, drops: Sequence[FlowAndRun]) -> Metrics:
     """Return volume and height of each drop with their errors, and the metrics that decide the verdict of an array."""
-    metrics: Metrics = ledger([flow for flow, _ in drops]) | {
+    metrics: Metrics = energy_metrics([flow for flow, _ in drops]) | {
         "max_width": (max(run.profiles[-1].max_width for _, run in drops), "m"),
         "axial_force": (0.0, "N"),
         "particles": (float(sum(len(flow.body.points) for flow, _ in drops)), ""),

@@ -19,7 +19,7 @@ from reflowshock.particles.parameters.effects import AT_REST, decide_effects, sw
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.scenes.flow_setup import contact_line, pad_lines, start_flow, stop_rule
 from reflowshock.particles.scenes.metrics import Metrics, joint_metrics, open_metrics, particle_pressure, verdict
-from reflowshock.particles.scenes.rebuild import parted_shape, split_to_rest
+from reflowshock.particles.scenes.rebuild import split_shape, split_to_rest
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run, StopRule, run_to_rest
 from reflowshock.particles.steps.shape import JointShape, Snapshot
@@ -102,7 +102,7 @@ class LiquidJoint:
             return drop
 
         drops = split_to_rest(flow, stop_rule(flow.body.cloud, self.solder, effects), start)
-        return parted_shape(shape, self.solder, drops) if drops else shape
+        return split_shape(shape, self.solder, drops) if drops else shape
 
 
 def solve_joint(

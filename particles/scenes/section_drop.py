@@ -5,18 +5,13 @@ of the cube; the piece with the drop's volume is as deep as the cube. The same e
 a polyline instead of triangles.
 """
 
-from dataclasses import replace
-
 import numpy as np
 
 from reflowshock.particles.parameters.scenes import Drop
 from reflowshock.particles.parameters.solder import Solder
-from reflowshock.particles.physics.forces import Gravity, SurfaceTension
-from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.scenes.flow_setup import build_physics
-from reflowshock.particles.section.forces import PolylineTension, PolylineWeight, PolylineWetting
 from reflowshock.particles.section.polyline import Polyline
-from reflowshock.particles.section.section import Section, block
+from reflowshock.particles.section.section import Section, fill_block
 from reflowshock.particles.section.section_step import SectionFlow, SectionStep
 from reflowshock.particles.steps.time_step import TimeStep, largest_step
 
@@ -27,21 +22,7 @@ def start_section(drop: Drop, solder: Solder, effects: dict[str, bool]) -> Secti
         polyline, width = Polyline.plane(is_closed=False, depth=drop.edge), 0.5 * drop.edge
     else:
         polyline, width = Polyline.meridian(), drop.edge / np.sqrt(np.pi)
-    body = Section.filled(block(polyline, width, drop.edge, drop.count), polyline)
+    body = Section.filled(fill_block(polyline, width, drop.edge, drop.count), polyline)
     largest, bound = largest_step(solder, body.cloud.spacing)
     time_step = TimeStep(largest, body.cloud.spacing, largest, bound, bound)
-    return SectionFlow(body, section_physics(solder, effects), time_step, SectionStep())
-
-
-def section_physics(solder: Solder, effects: dict[str, bool]) -> Physics:
-    """Build the physics of a section of a drop, with surface forces on its polyline."""
-    physics = build_physics(solder, effects | {"wall_adhesion": False}, ())
-    wetting = (PolylineWetting(solder.surface_tension, solder.pad_contact_angle),) if effects["wall_adhesion"] else ()
-
-    forces = [part for part in physics.forces if not isinstance(part, SurfaceTension | Gravity)]
-    forces += [PolylineTension(part.coefficient) for part in physics.forces if isinstance(part, SurfaceTension)]
-    forces += [PolylineWeight(part.weight) for part in physics.forces if isinstance(part, Gravity)]
-    operators = [
-        PolylineTension(part.coefficient) if isinstance(part, SurfaceTension) else part for part in physics.operators
-    ]
-    return replace(physics, forces=(*forces, *wetting), operators=tuple(operators))
+    return SectionFlow(body, build_physics(solder, effects, (), in_section=True), time_step, SectionStep())

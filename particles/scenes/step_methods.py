@@ -41,7 +41,7 @@ class StepMethod:
 
 def has_motion(effects: Mapping[str, bool]) -> bool:
     """Return whether inertia or viscosity acts, which have no effect at rest."""
-    return any(effects[name] for name in AT_REST)
+    return any(effects.get(name, False) for name in AT_REST)
 
 
 # The first method of the selected scheme that computes the active effects is used.

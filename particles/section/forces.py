@@ -1,13 +1,15 @@
 """Forces on a surface in section, as energy gradients: surface tension, weight, wetting of the wall z = 0."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import sparse
 
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.body import Body
+from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.forces import Gravity, SurfaceTension
+from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.section.section import as_section
 
 
@@ -55,6 +57,12 @@ class PolylineWetting:
 
     coefficient: float
     angle: float
+
+    @classmethod
+    def added_to(cls, physics: Physics, solder: Solder) -> Physics:
+        """Add the force to the physics."""
+        wetting = cls(solder.surface_tension, solder.pad_contact_angle)
+        return replace(physics, forces=(*physics.forces, wetting))
 
     def energy(self, body: Body) -> float:
         """Return the energy of the wetted wall [J]."""

@@ -69,18 +69,22 @@ class Section(Body):
         Particles below the surface stay in the section.
         """
         if self.polyline.power:
-            return self.swept(rotated(2.0 * np.pi * np.arange(MERIDIANS) / MERIDIANS), is_closed=True)
-        return self.swept(translated(self.polyline.factor), is_closed=False)
+            return self.swept(rotate_copies(2.0 * np.pi * np.arange(MERIDIANS) / MERIDIANS), is_closed=True)
+        return self.swept(translate_copies(self.polyline.factor), is_closed=False)
 
     def enclosing(self) -> Body:
         """Return a triangulated body whose surface encloses the liquid; a plane drop gets a depth of 100 widths."""
         if self.polyline.power:
             return self.whole()
-        return self.swept(translated(LONG * float(np.ptp(self.line, axis=0).max())), is_closed=False)
+        return self.swept(translate_copies(LONG * float(np.ptp(self.line, axis=0).max())), is_closed=False)
 
     def narrow(self) -> Body:
         """Return the surface between two copies of the polyline so close that triangles are as accurate as segments."""
-        copies = rotated(np.array([0.0, NARROW])) if self.polyline.power else translated(NARROW * self.cloud.spacing)
+        copies = (
+            rotate_copies(np.array([0.0, NARROW]))
+            if self.polyline.power
+            else translate_copies(NARROW * self.cloud.spacing)
+        )
         return self.swept(copies, is_closed=False)
 
     def swept(self, copies: "Placements", is_closed: bool) -> Body:
@@ -149,20 +153,20 @@ class Placements:
     shifts: Floats
 
 
-def rotated(angles: Floats) -> Placements:
+def rotate_copies(angles: Floats) -> Placements:
     """Return copies rotated about the z axis by angles of shape (m,) [rad]."""
     cosine, sine, none = np.cos(angles), np.sin(angles), np.zeros_like(angles)
     rows = [[cosine, -sine, none], [sine, cosine, none], [none, none, none + 1.0]]
     return Placements(np.moveaxis(np.array(rows), 2, 0), np.zeros((len(angles), 3)))
 
 
-def translated(depth: float) -> Placements:
+def translate_copies(depth: float) -> Placements:
     """Return two copies a depth [m] apart along y, on either side of the section."""
     shifts = depth * np.array([[0.0, -0.5, 0.0], [0.0, 0.5, 0.0]])
     return Placements(np.broadcast_to(np.eye(3), (2, 3, 3)), shifts)
 
 
-def block(polyline: Polyline, width: float, height: float, count: int) -> Cloud:
+def fill_block(polyline: Polyline, width: float, height: float, count: int) -> Cloud:
     """Return a rectangular lattice of particles on the wall z = 0.
 
     The first particles below the surface are half a spacing off the axis: each has a pressure that keeps its volume,
@@ -193,7 +197,7 @@ def block(polyline: Polyline, width: float, height: float, count: int) -> Cloud:
     return Cloud(points, len(surface), NO_TRIANGLES, *walls, wall, height / last, axes)
 
 
-def disc(polyline: Polyline, radius: float, rings: int) -> Cloud:
+def fill_disc(polyline: Polyline, radius: float, rings: int) -> Cloud:
     """Return concentric circles of particles without a wall; half circles without particles on the axis for a meridian.
 
     Args:

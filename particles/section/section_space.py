@@ -14,8 +14,8 @@ from scipy import sparse
 from reflowshock.arrays import Floats
 from reflowshock.particles.core.neighbours import find_neighbours
 from reflowshock.particles.ispg.galerkin_space import symmetry_planes
-from reflowshock.particles.ispg.ghosts import mirror
-from reflowshock.particles.ispg.nodal_volumes import SOFTNESS, cell_share, fitted_volumes
+from reflowshock.particles.ispg.ghosts import mirror_particles
+from reflowshock.particles.ispg.nodal_volumes import SOFTNESS, cell_share, fit_volumes
 from reflowshock.particles.ispg.stencils import check_stencils
 from reflowshock.particles.section.section import Section
 
@@ -58,7 +58,7 @@ class SectionSpace:
         count, spacing = len(body.points), body.cloud.spacing
         least = np.full(count, SUPPORT * spacing)
         for reach in spacing * np.array(REACHES):
-            ghosts = mirror(body.points, (*body.plates, *symmetry_planes(body.cloud)), reach)
+            ghosts = mirror_particles(body.points, (*body.plates, *symmetry_planes(body.cloud)), reach)
             pairs = _Pairs.within(np.concatenate((body.points, ghosts.points)), least, reach)
             has_enough, across = pairs.supports > 0.0, pairs.across()
             is_thin = has_enough & (across < THIN)
@@ -266,7 +266,7 @@ def section_volumes(body: Section, density: Floats) -> Floats:
     moments = np.array([volume, *(scale * polyline.integral(line, p, q)[0] for p, q in exponents)])
     entries = np.array([np.inf, *(np.inf if p + q < 2 else 1.0 + (p == q) for p, q in exponents)])
     softness = SOFTNESS * volume * (body.cloud.spacing / length) ** 4 / entries
-    return fitted_volumes(cells * (volume / cells.sum()), powers, moments, softness)
+    return fit_volumes(cells * (volume / cells.sum()), powers, moments, softness)
 
 
 def _mean_radius(body: Section) -> Floats:

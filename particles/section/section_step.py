@@ -27,7 +27,7 @@ from reflowshock.particles.ispg.galerkin_equations import (
 )
 from reflowshock.particles.ispg.galerkin_space import AT_REST, GalerkinSpace
 from reflowshock.particles.ispg.ispg_step import IspgStep, PreparedIspgStep
-from reflowshock.particles.ispg.rigid_motions import orthonormal, rigid_motions
+from reflowshock.particles.ispg.rigid_motions import orthonormalise, rigid_motions
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.section.forces import PolylineTension
 from reflowshock.particles.section.polyline import Polyline
@@ -113,9 +113,9 @@ class PreparedSectionStep(PreparedIspgStep):
         """Assemble the equations of a section at other positions for a time step [s]; its wall is at rest."""
         section, fluid = as_section(body), self.fluid(body.cloud.spacing)
         tensions = [part for part in self.physics.operators if isinstance(part, PolylineTension)]
-        space, basis = SectionSpace.of(section), admissible(body)
+        space, basis = SectionSpace.of(section), admissible_basis(body)
         masses = fluid.density * space.volumes
-        rigid = orthonormal(rigid_motions(body.points)[self.admitted], masses)
+        rigid = orthonormalise(rigid_motions(body.points)[self.admitted], masses)
         stiffness = sum((part.stiffness(body) for part in tensions), sparse.csr_matrix((masses.size * 3,) * 2))
         motions = rigid.reshape(len(rigid), 3 * len(masses)) @ basis
         free_stiffness = sparse.bsr_matrix(basis.T @ stiffness @ basis, blocksize=(1, 1))
@@ -137,7 +137,7 @@ class PreparedSectionStep(PreparedIspgStep):
         )
 
 
-def admissible(body: Body) -> sparse.csr_matrix:
+def admissible_basis(body: Body) -> sparse.csr_matrix:
     """Return a basis of the velocities within the plane, along walls and along the axis, shape (3 n, d)."""
     free = np.ones((len(body.points), 3), bool)
     free[:, 1] = False

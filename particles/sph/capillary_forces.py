@@ -60,9 +60,9 @@ class Capillarity:
         result += pressure * volume_and_gradient(mesh.points, mesh.triangles, (), ())[1]
         if wetness is not None:
             result += self.tension * self.cosine * area_gradient(mesh.points, mesh.triangles, wetness)
-            result = ground.tangential(result, mesh.wetness, mesh.ground_normals)
+            result = ground.remove_normal_part(result, mesh.wetness, mesh.ground_normals)
         for ring in mesh.rings:
-            outward = outward_along(mesh.points[ring])
+            outward = line_normals(mesh.points[ring])
             cosines: Floats | float = self.cosine
             if self.bounds is not None and drift is not None:
                 cosines = contact_cosines(*self.bounds, outward, result[ring, :2] / self.tension, drift[ring])
@@ -74,7 +74,7 @@ class Capillarity:
         """Return velocities (m, 3) [m/s] along the wall over the sliding velocity; None without hysteresis."""
         if self.bounds is None or not self.tension:
             return None
-        return over_sliding_velocity(velocities, self.tension, self.law)
+        return divide_by_sliding_velocity(velocities, self.tension, self.law)
 
 
 def _balancing_pressure(mesh: SurfaceMesh, forces: Floats) -> float:
@@ -88,7 +88,7 @@ def _balancing_pressure(mesh: SurfaceMesh, forces: Floats) -> float:
     return -float((forces * area).sum()) / square if square else 0.0
 
 
-def outward_along(line: Floats) -> Floats:
+def line_normals(line: Floats) -> Floats:
     """Return the outward normals of a contact line within the wall, shape (k, 2) [m].
 
     Their length is half the distance between the two neighbours of each vertex.
@@ -111,7 +111,7 @@ def contact_cosines(lowest: float, highest: float, outward: Floats, push: Floats
     Args:
         lowest: Cosine of the advancing angle.
         highest: Cosine of the receding angle.
-        outward: Normals within the wall, as ``outward_along`` returns them, shape (k, 2) [m].
+        outward: Normals within the wall, as ``line_normals`` returns them, shape (k, 2) [m].
         push: Forces on the vertices except the wall force, over the surface tension, shape (k, 2) [m].
         drift: Velocities of the vertices over the sliding velocity, shape (k, 2).
     """
@@ -120,7 +120,7 @@ def contact_cosines(lowest: float, highest: float, outward: Floats, push: Floats
     return np.clip(needed, lowest, highest)[:, None]
 
 
-def over_sliding_velocity(velocities: Floats, tension: float, law: Law) -> Floats:
+def divide_by_sliding_velocity(velocities: Floats, tension: float, law: Law) -> Floats:
     """Return velocities along the wall over the velocity from which on a contact line slides, shape (m, 2).
 
     The sliding velocity is gamma / (rho h c). At it friction would stop the mass of a support, rho h^2 a unit of

@@ -11,7 +11,7 @@ from reflowshock.arrays import Floats
 from reflowshock.particles.core.checkpoint import Checkpoint
 from reflowshock.particles.core.threads import threads_for
 from reflowshock.particles.flows.flow import FlowScene
-from reflowshock.particles.flows.flow_effects import artificial_viscosity, decide_flow
+from reflowshock.particles.flows.flow_effects import artificial_viscosity, decide_flow, sph_numerics, sph_sound
 from reflowshock.particles.flows.result import FlowResult, Metrics, Picture
 from reflowshock.particles.sph.fluid_state import GRADIENTS, Fields, Law
 from reflowshock.particles.sph.shear_viscosity import LAWS, NEWTON
@@ -134,7 +134,7 @@ def device_of(scene: FlowScene) -> Callable[[Fields, int, Law], Particles]:
     Raises:
         NoDeviceError: The machine has no CUDA device.
     """
-    if scene.numerics.device == "cpu":
+    if sph_numerics(scene).device == "cpu":
         return ThreadParticles
     from reflowshock.particles.sph.cuda_particles import CudaParticles
 
@@ -150,7 +150,7 @@ def law_of(scene: FlowScene, periods: Vector, gravity: Vector, has_surface: bool
         gravity: Gravity along x, y and z [m/s^2].
         has_surface: Whether the liquid has a free surface, near which particles cannot be shifted.
     """
-    numerics, spacing = scene.numerics, scene.spacing
+    numerics, spacing, sound = sph_numerics(scene), scene.spacing, sph_sound(scene)
     length, kernel = numerics.smoothing_length * spacing, KERNELS[numerics.kernel]
     return Law(
         kernel=kernel,
@@ -158,10 +158,10 @@ def law_of(scene: FlowScene, periods: Vector, gravity: Vector, has_surface: bool
         length=length,
         norm=norm(kernel, 2, length),
         rest_density=scene.density,
-        sound=scene.sound,
-        diffusion=numerics.density_diffusion * length * scene.sound,
+        sound=sound,
+        diffusion=numerics.density_diffusion * length * sound,
         gradient=GRADIENTS[numerics.density_gradient],
-        artificial=artificial_viscosity(scene) * length * scene.sound * scene.density,
+        artificial=artificial_viscosity(scene) * length * sound * scene.density,
         viscosity=scene.liquid_viscosity if decide_flow(scene)["flow_viscosity"]["on"] else 0.0,
         **shear_law(scene),
         has_surface=int(has_surface),
@@ -194,7 +194,7 @@ def shear_law(scene: FlowScene) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def in_space(law: Law, spacing: float, mirror: bool, no_slip: bool) -> Law:
+def law_in_space(law: Law, spacing: float, mirror: bool, no_slip: bool) -> Law:
     """Return the law of the same flow in space.
 
     Args:
@@ -212,10 +212,10 @@ def in_space(law: Law, spacing: float, mirror: bool, no_slip: bool) -> Law:
 
 def wall_layers(scene: FlowScene) -> int:
     """Return the number of layers of wall particles that fill the support of liquid near a wall."""
-    return int(np.ceil(SUPPORT * scene.numerics.smoothing_length))
+    return int(np.ceil(SUPPORT * sph_numerics(scene).smoothing_length))
 
 
-def liquid_and_walls(liquid: Floats, walls: Floats, pressure: Floats, law: Law) -> Fields:
+def make_fields(liquid: Floats, walls: Floats, pressure: Floats, law: Law) -> Fields:
     """Return the initial fields of liquid and walls at rest.
 
     Args:

@@ -27,7 +27,7 @@ from reflowshock.particles.sph.capillary_forces import Capillarity
 from reflowshock.particles.sph.fluid_state import Fields, Law
 from reflowshock.particles.sph.smoothing import SUPPORT
 from reflowshock.particles.sph.surface_coupling import OWN, SurfaceCoupling, distribute
-from reflowshock.particles.sph.thin_films import add_wall_friction, film_sums
+from reflowshock.particles.sph.thin_films import add_wall_friction, sum_film_surface
 from reflowshock.particles.surface import ground as solid_ground
 from reflowshock.particles.surface.breakup import are_outside
 from reflowshock.particles.surface.level_set import LevelSet
@@ -179,11 +179,11 @@ class LiquidSurface:
         drift = self.capillarity.relative_drift(self.coupling.velocities(fields)) if self.capillarity.bounds else None
         distribute(lists, weights, np.array((self.forces(drift), outward)), sums)
         if self.law.mirror and self.law.no_slip:
-            films = film_sums(self.mesh.points, self.mesh.normals(), lists, weights[1, 0], len(fields.x))
+            films = sum_film_surface(self.mesh.points, self.mesh.normals(), lists, weights[1, 0], len(fields.x))
             add_wall_friction(films, fields, self.law, rates)
         if self.mesh.ground is not None:
             reach = SUPPORT * self.law.length
-            images, outward = solid_ground.reflect(self.mesh.ground, self.mesh.points, outward, reach)
+            images, outward = solid_ground.reflect_at_ground(self.mesh.ground, self.mesh.points, outward, reach)
             weights, _ = self.coupling.weights(images, fields)
             distribute(lists, weights[1:], outward[None], sums[1:])
         fluids = rates.shape[1]

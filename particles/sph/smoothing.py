@@ -52,7 +52,7 @@ def slope(kernel, line, q):
     return inside if q < 2.0 else 0.0
 
 
-def beyond_plane(kernel: int, distance: Floats) -> Floats:
+def share_beyond_plane(kernel: int, distance: Floats) -> Floats:
     """Return the share of the integral of W in space beyond a plane, shape (n,).
 
     Of a sphere of radius r about the point the area 2 pi r (r - distance) is beyond the plane.

@@ -65,7 +65,7 @@ class SurfaceCoupling:
     def _build(self, mesh: SurfaceMesh, positions: Floats) -> None:
         self.built_at, self._revision, vertices = positions, mesh.revision, len(mesh.points)
         reach, points = SUPPORT * self.law.length + SKIN * self.law.spacing, np.ascontiguousarray(positions.T)
-        self.lists = near_vertices(points[:vertices], points[vertices:], reach)
+        self.lists = find_near_vertices(points[:vertices], points[vertices:], reach)
 
     def weights(self, points: Floats, fields: Fields) -> tuple[Floats, Floats]:
         """Compute the kernel between points, one for each vertex, and the particles near the vertices.
@@ -102,7 +102,7 @@ class SurfaceCoupling:
         return distances
 
 
-def near_vertices(vertices: Floats, particles: Floats, reach: float) -> tuple[Indices, Indices]:
+def find_near_vertices(vertices: Floats, particles: Floats, reach: float) -> tuple[Indices, Indices]:
     """Find the particles near each vertex, or the nearest one if none is within the kernel support.
 
     Args:

@@ -26,7 +26,7 @@ STRONGEST = 2.0
 LEVEL, MOST = 0.7, 0.5
 
 
-def film_sums(
+def sum_film_surface(
     points: Floats, normals: Floats, lists: tuple[Indices, Indices], kernel: Floats, particles: int
 ) -> Floats:
     """Sum the surface near each particle.
@@ -48,7 +48,7 @@ def film_sums(
 
 @njit(cache=True)
 def _sum_surface(points, normals, lists, kernel, sums):
-    """Add the sums of ``film_sums``."""
+    """Add the sums of ``sum_film_surface``."""
     offsets, indices = lists
     for v in range(points.shape[0]):
         is_level = normals[v, 2] > LEVEL
@@ -65,7 +65,7 @@ def add_wall_friction(sums: Floats, fields: Fields, law: Law, rates: Floats) -> 
     """Subtract the missing friction of the wall z = 0 from the accelerations of particles in films.
 
     Args:
-        sums: Surface near each particle, as ``film_sums`` returns it, shape (3, particles).
+        sums: Surface near each particle, as ``sum_film_surface`` returns it, shape (3, particles).
         fields: Fields of all particles.
         law: Parameters of the pair interactions.
         rates: Rates of the liquid, shape (10, n); rows 1 and 2 change.

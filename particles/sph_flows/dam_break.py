@@ -37,7 +37,7 @@ def dam(scene: DamBreak) -> Simulation:
     law = flow.law_of(scene, (0.0, 0.0, 0.0), (0.0, 0.0, -scene.gravity), has_surface=True)
     liquid = column_points(scene)
     pressure = scene.density * scene.gravity * (scene.height - liquid[2])
-    fields = flow.liquid_and_walls(liquid, tank_points(scene, flow.wall_layers(scene)), pressure, law)
+    fields = flow.make_fields(liquid, tank_points(scene, flow.wall_layers(scene)), pressure, law)
     return Simulation(fields, liquid.shape[1], law, device=flow.device_of(scene))
 
 

@@ -18,9 +18,9 @@ from reflowshock.particles.sph.capillary_forces import Capillarity
 from reflowshock.particles.sph.fluid_state import Law
 from reflowshock.particles.sph.liquid_surface import LiquidSurface
 from reflowshock.particles.sph.simulation import Simulation
-from reflowshock.particles.surface.breakup import largest_part
+from reflowshock.particles.surface.breakup import find_largest_part
 from reflowshock.particles.surface.morphological_closing import count_parts
-from reflowshock.particles.surface.profile import width
+from reflowshock.particles.surface.profile import mean_width
 from reflowshock.particles.surface.remeshing import EDGE
 from reflowshock.particles.surface.surface_mesh import SurfaceLost, SurfaceMesh
 
@@ -73,7 +73,7 @@ def droplet(scene: Droplet) -> Simulation:
     """Set up the particles and their surface, whose tension balances the pressure of a sphere."""
     points, triangles, spacing = start_shape(scene, EDGE)
     law, tension = liquid_of(scene, spacing)
-    fields = flow.liquid_and_walls(points, np.empty((3, 0)), np.zeros(points.shape[1]), law)
+    fields = flow.make_fields(points, np.empty((3, 0)), np.zeros(points.shape[1]), law)
     fields.w[:] = -scene.impact_speed
     mesh = SurfaceMesh(*triangles, law.spacing, bool(law.mirror))
     surface = LiquidSurface(mesh, Capillarity(tension, cos(scene.angle), law, scene.bounds))
@@ -87,7 +87,7 @@ def liquid_of(scene: Droplet, spacing: float) -> tuple[Law, float]:
     effects = decide_flow(scene)
     weight = -scene.gravity if effects["droplet_gravity"]["on"] else 0.0
     law = flow.law_of(scene, (0.0, 0.0, 0.0), (0.0, 0.0, weight), has_surface=True)
-    law = flow.in_space(law, spacing, mirror=scene.has_wall, no_slip=scene.impact_speed > 0.0)
+    law = flow.law_in_space(law, spacing, mirror=scene.has_wall, no_slip=scene.impact_speed > 0.0)
     law = law._replace(tracked=1, shifting=1.0)
     return law, scene.surface_tension if effects["droplet_tension"]["on"] else 0.0
 
@@ -104,7 +104,7 @@ def _sample(scene: Droplet, simulation: Simulation) -> tuple[float, ...]:
     pressure = float((simulation.pressures[core] if core.any() else simulation.pressures).mean())
     return (
         simulation.time, pressure, float(distance.max() / distance.min()),
-        width(largest_part(surface.points, surface.triangles)) / scene.diameter,
+        mean_width(find_largest_part(surface.points, surface.triangles)) / scene.diameter,
         base_width(surface.points, simulation.law.spacing) / scene.diameter,
         drop_height(scene, surface.points) / scene.diameter, simulation.fastest,
         simulation.kinetic_energy, surface.energy, (surface.volume + surface.spray) / scene.volume,

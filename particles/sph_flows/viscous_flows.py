@@ -48,7 +48,7 @@ def channel(scene: Poiseuille) -> Simulation:
     """Set up liquid at rest between two plates."""
     law = flow.law_of(scene, (scene.columns * scene.spacing, 0.0, 0.0), (scene.force, 0.0, 0.0), has_surface=False)
     liquid, walls = channel_points(scene), plate_points(scene, flow.wall_layers(scene))
-    fields = flow.liquid_and_walls(liquid, walls, np.zeros(liquid.shape[1]), law)
+    fields = flow.make_fields(liquid, walls, np.zeros(liquid.shape[1]), law)
     return Simulation(fields, liquid.shape[1], law, device=flow.device_of(scene))
 
 
@@ -84,6 +84,6 @@ def vortices(scene: TaylorGreen) -> Simulation:
     law = flow.law_of(scene, (scene.side, 0.0, scene.side), (0.0, 0.0, 0.0), has_surface=False)
     liquid = box_points(scene)
     u, w, pressure = exact.taylor_green(liquid[0], liquid[2], scene.side)
-    fields = flow.liquid_and_walls(liquid, np.empty((3, 0)), scene.density * scene.speed**2 * pressure, law)
+    fields = flow.make_fields(liquid, np.empty((3, 0)), scene.density * scene.speed**2 * pressure, law)
     fields.u[:], fields.w[:] = scene.speed * u, scene.speed * w
     return Simulation(fields, liquid.shape[1], law, device=flow.device_of(scene))

@@ -3,7 +3,8 @@
 With r = dt / dt_before, BDF2 reads x = x_base + dt_eff v and v = v_base + dt_eff a, where
 dt_eff = dt (1 + r) / (1 + 2 r), x_base = x_n + w (x_n - x_before), v_base = v_n + w (v_n - v_before) and
 w = r^2 / (1 + 2 r). The first step is backward Euler. A mode of frequency omega is damped at a rate of
-omega^4 dt^3 / 4 and slowed by a fraction (omega dt)^2 / 3. ``stepped`` converts effects to that backward Euler step.
+omega^4 dt^3 / 4 and slowed by a fraction (omega dt)^2 / 3. ``prepare_physics`` converts effects to that backward
+Euler step.
 """
 
 from dataclasses import dataclass, replace
@@ -126,16 +127,16 @@ class SteppedMotion:
         """External force on the plate, shape (3,) [N]."""
         return self.motion.load
 
-    def given(self, plate: Plate, time_step: float) -> Floats:
+    def prescribed_twist(self, plate: Plate, time_step: float) -> Floats:
         """Return the twist at the end of the step, shape (6,) [m/s, rad/s]."""
-        return (self.whole * self.motion.given(plate, self.whole) - self.carried) / time_step
+        return (self.whole * self.motion.prescribed_twist(plate, self.whole) - self.carried) / time_step
 
     def after_split(self, wall: int) -> PlateMotion | None:
         """Return the motion of the plate after the body has split."""
         return self.motion.after_split(wall)
 
 
-def stepped(physics: Physics, velocity: Floats, carried: dict[int, Floats], time_step: float) -> Physics:
+def prepare_physics(physics: Physics, velocity: Floats, carried: dict[int, Floats], time_step: float) -> Physics:
     """Return the effects as the equivalent backward Euler step from predicted positions uses them.
 
     Args:

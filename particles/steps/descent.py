@@ -133,7 +133,7 @@ def is_driven(body: Body, physics: Physics, time_step: float) -> bool:
     """Return whether a plate moves along a prescribed path in a step [s]."""
     for motion in physics.motions:
         plate, line = body.plates[motion.wall], body.points[body.cloud.rings[motion.wall]]
-        displacement = time_step * plate.rigid_velocity(motion.given(plate, time_step), line)
+        displacement = time_step * plate.rigid_velocity(motion.prescribed_twist(plate, time_step), line)
         if np.abs(displacement).max() > ARRIVED * body.cloud.spacing:
             return True
     return False

@@ -19,12 +19,12 @@ from reflowshock.data_file import fields_of
 from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.discretisation.discretisation import LinearTetrahedra, particle_mass
-from reflowshock.particles.discretisation.field_transfer import Transfer, interpolation
-from reflowshock.particles.discretisation.incompressibility import solve
-from reflowshock.particles.discretisation.inner_tetrahedra import fill
+from reflowshock.particles.discretisation.field_transfer import Transfer, interpolation_matrix
+from reflowshock.particles.discretisation.incompressibility import solve_saddle_point
+from reflowshock.particles.discretisation.inner_tetrahedra import fill_with_tetrahedra
 from reflowshock.particles.physics.operators import Viscosity
 from reflowshock.particles.physics.physics import Physics
-from reflowshock.particles.steps.backward_difference import BackwardDifference, Base, stepped
+from reflowshock.particles.steps.backward_difference import BackwardDifference, Base, prepare_physics
 from reflowshock.particles.steps.step_equations import StepEquations
 from reflowshock.particles.steps.step_solver import Motion, SolverTraits, StepSolver
 from reflowshock.particles.steps.time_step import LARGEST_DISPLACEMENT
@@ -62,7 +62,7 @@ class InertialState:
             density: Density [kg/m^3].
             viscosity: Dynamic viscosity [Pa s].
         """
-        space = LinearTetrahedra.start(body.points, fill(body), density, viscosity)
+        space = LinearTetrahedra.start(body.points, fill_with_tetrahedra(body), density, viscosity)
         return cls(space, body.triangles, body.points, BackwardDifference.start(len(body.points)), {})
 
     def saved(self) -> dict[str, Any]:
@@ -92,8 +92,8 @@ class InertialState:
 
     def transferred(self, body: Body, physics: Physics) -> tuple["InertialState", Floats]:
         """Return the state on new tetrahedra, and the velocity at the current positions, shape (n, 3) [m/s]."""
-        new = LinearTetrahedra.start(body.points, fill(body), self.space.density, self.space.viscosity)
-        values = interpolation(self.points, self.space.cells, body.points - self.points)
+        new = LinearTetrahedra.start(body.points, fill_with_tetrahedra(body), self.space.density, self.space.viscosity)
+        values = interpolation_matrix(self.points, self.space.cells, body.points - self.points)
         unit_fields = [physics.admit(body, np.broadcast_to(axis, body.points.shape)) for axis in np.eye(3)]
         transfer = Transfer(values, self.space.mass, new.mass, unit_fields)
         old = self.history
@@ -193,10 +193,10 @@ class PreparedInertialStep:
         }
         predicted = replace(body, points=base.points + base.time_step * guess, velocity=base.velocity)
         space = state.space(predicted)
-        equations = StepEquations(predicted, stepped(self.physics, guess, carried, time_step), space)
+        equations = StepEquations(predicted, prepare_physics(self.physics, guess, carried, time_step), space)
         swept = base.time_step * float((space.constraint @ guess.T.ravel()).sum())
         problem = equations.problem(base.time_step, volume + swept)
-        solution = solve(replace(problem, guess=body.pressure))
+        solution = solve_saddle_point(replace(problem, guess=body.pressure))
         velocity, twists = equations.expand(solution.velocity, base.time_step)
         points = base.points + base.time_step * velocity
         plates = {wall: carried[wall] + base.time_step * twist for wall, twist in twists.items()}

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from reflowshock.arrays import Floats, Indices
 
 
-def concatenated(arrays: Sequence[NDArray], counts: Sequence[int]) -> NDArray:
+def concatenate_shapes(arrays: Sequence[NDArray], counts: Sequence[int]) -> NDArray:
     """Concatenate particle arrays of several bodies, surface particles first.
 
     Args:

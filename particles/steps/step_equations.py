@@ -91,7 +91,7 @@ class Admissible:
     def _sum_of_prescribed(self, field: Callable[[int, Floats], Floats], time_step: float) -> Floats:
         """Return the sum of a velocity field over all plates with prescribed motion."""
         plates = self._body.plates
-        twists = ((motion.wall, motion.given(plates[motion.wall], time_step)) for motion in self._motions)
+        twists = ((motion.wall, motion.prescribed_twist(plates[motion.wall], time_step)) for motion in self._motions)
         return sum((field(wall, twist) for wall, twist in twists), np.zeros(3 * len(self._body.points)))
 
     def reduce(self, load: Floats) -> Floats:
@@ -118,7 +118,7 @@ class Admissible:
         result, start = {}, 0
         for motion in self._motions:
             stop = start + len(motion.directions)
-            prescribed = motion.given(self._body.plates[motion.wall], time_step)
+            prescribed = motion.prescribed_twist(self._body.plates[motion.wall], time_step)
             result[motion.wall] = prescribed + rates[start:stop] @ motion.directions
             start = stop
         return result

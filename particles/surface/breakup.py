@@ -64,7 +64,7 @@ def with_contact_lines(triangles: Indices) -> tuple[Indices, Indices, tuple[Indi
         return used[old], triangles, boundary_loops(triangles)
 
 
-def volumes_of_parts(points: Floats, triangles: Indices) -> tuple[Indices, Floats]:
+def measure_parts(points: Floats, triangles: Indices) -> tuple[Indices, Floats]:
     """Compute the volumes of the connected parts of a surface that the wall z = 0 closes.
 
     Args:
@@ -80,13 +80,13 @@ def volumes_of_parts(points: Floats, triangles: Indices) -> tuple[Indices, Float
     return part, volumes
 
 
-def largest_part(points: Floats, triangles: Indices) -> Floats:
-    """Return the vertices (k, 3) [m] of the part with the largest volume; arguments as for ``volumes_of_parts``."""
-    part, volumes = volumes_of_parts(points, triangles)
+def find_largest_part(points: Floats, triangles: Indices) -> Floats:
+    """Return the vertices (k, 3) [m] of the part with the largest volume; arguments as for ``measure_parts``."""
+    part, volumes = measure_parts(points, triangles)
     return points[np.unique(triangles[part == volumes.argmax()])]
 
 
-def small_parts(points: Floats, triangles: Indices, least: float) -> tuple[NDArray[np.bool_], float]:
+def find_small_parts(points: Floats, triangles: Indices, least: float) -> tuple[NDArray[np.bool_], float]:
     """Find the parts of a surface with less than a volume, except the largest part and cavities.
 
     Args:
@@ -97,7 +97,7 @@ def small_parts(points: Floats, triangles: Indices, least: float) -> tuple[NDArr
     Returns:
         Whether each triangle belongs to a small part, shape (t,), and the total volume of these parts [m^3].
     """
-    part, volumes = volumes_of_parts(points, triangles)
+    part, volumes = measure_parts(points, triangles)
     is_small = (volumes >= 0.0) & (volumes < least)
     is_small[volumes.argmax()] = False
     return is_small[part], float(volumes[is_small].sum())

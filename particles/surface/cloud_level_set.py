@@ -9,7 +9,7 @@ from reflowshock.arrays import Floats, Indices
 from reflowshock.particles.core.cloud import Cloud, equal_area_radius
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.core.surface_measure import volume_and_gradient
-from reflowshock.particles.surface.level_set import LevelSet, extract_surface, relax
+from reflowshock.particles.surface.level_set import LevelSet, extract_surface, smooth_on_level_set
 
 # Least depth of an interior particle below the surface, in spacings.
 DEPTH = 0.75
@@ -54,7 +54,7 @@ def cloud_from_level_set(level: LevelSet, volume: float, walls: Sequence[Plate])
     points, triangles = cut_at_walls(points, triangles, walls, 1e-6 * level.grid.spacing)
     contacts = [_Contact(ring, plate) for plate in walls for ring in _loops(points, triangles, plate)]
     rings, plates = tuple(contact.ring for contact in contacts), tuple(contact.plate for contact in contacts)
-    points, triangles = relax(level, points, triangles, rings)
+    points, triangles = smooth_on_level_set(level, points, triangles, rings)
     on_edge = [_snap(points, contact, level.grid.spacing) for contact in contacts]
     points = _with_volume(points, triangles, contacts, on_edge, volume)
     below = _interior(level, walls)

@@ -146,7 +146,7 @@ class ContactLine:
         points, index = whole_points(body.cloud, body.points, self.wall)
         local, pad = body.plates[self.wall].local(points)[:, :2], self.pad[index]
         offset = local - self._centres[pad]
-        area, beyond = sectors(local).sum(), sectors(offset)
+        area, beyond = sector_areas(local).sum(), sector_areas(offset)
         if self.has_edge:
             turns = np.array([_turns(local - centre).sum() for centre in self._centres])
             area -= 0.5 * self._square @ turns
@@ -291,7 +291,7 @@ class ContactLine:
         return offset, np.linalg.norm(offset, axis=1)
 
 
-def sectors(local: Floats) -> Floats:
+def sector_areas(local: Floats) -> Floats:
     """Return the areas of the triangles of the origin and each segment of a closed line (k, 2), shape (k,) [m^2]."""
     x, y = local.T
     return 0.5 * (x * ahead(y) - y * ahead(x))
@@ -307,7 +307,7 @@ def _sectors_gradient(local: Floats, weight: Floats) -> Floats:
 def _turns(local: Floats) -> Floats:
     """Return the angle that each segment of a closed line (k, 2) subtends at the origin, shape (k,) [rad]."""
     after = ahead(local)
-    return np.arctan2(2.0 * sectors(local), (local * after).sum(axis=1))
+    return np.arctan2(2.0 * sector_areas(local), (local * after).sum(axis=1))
 
 
 def _turns_gradient(local: Floats, weight: Floats) -> Floats:

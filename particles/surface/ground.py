@@ -10,7 +10,7 @@ from reflowshock.arrays import Floats
 from reflowshock.particles.surface.level_set import LevelSet
 
 
-def settle(ground: LevelSet, points: Floats, outward: Floats, near: float) -> tuple[Floats, Floats]:
+def settle_on_ground(ground: LevelSet, points: Floats, outward: Floats, near: float) -> tuple[Floats, Floats]:
     """Move vertices that have reached the ground onto it.
 
     Args:
@@ -31,12 +31,12 @@ def settle(ground: LevelSet, points: Floats, outward: Floats, near: float) -> tu
     return wetness, normals
 
 
-def tangential(vectors: Floats, wetness: Floats, normals: Floats) -> Floats:
+def remove_normal_part(vectors: Floats, wetness: Floats, normals: Floats) -> Floats:
     """Return vectors (m, 3) without their component along the ground's normals, in proportion to the wetness (m,)."""
     return vectors - (wetness * (vectors * normals).sum(axis=1))[:, None] * normals
 
 
-def reflect(ground: LevelSet, points: Floats, vectors: Floats, reach: float) -> tuple[Floats, Floats]:
+def reflect_at_ground(ground: LevelSet, points: Floats, vectors: Floats, reach: float) -> tuple[Floats, Floats]:
     """Return the mirror images of points and of vectors at them behind the face of the ground.
 
     Args:

@@ -10,7 +10,14 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.plate import Pad
 from reflowshock.particles.core.surface_measure import ring_area_gradient
 from reflowshock.particles.core.symmetry import share, whole_points
-from reflowshock.particles.surface.contact_line import ON_MASK, ON_PAD, PINNED, RELEASE_MARGIN, ContactLine, sectors
+from reflowshock.particles.surface.contact_line import (
+    ON_MASK,
+    ON_PAD,
+    PINNED,
+    RELEASE_MARGIN,
+    ContactLine,
+    sector_areas,
+)
 
 RECEDING, ADVANCING = ON_PAD, ON_MASK
 
@@ -56,7 +63,7 @@ class HystereticLine(ContactLine):
     def _level(self, body: Body) -> float:
         """Return the wetted area times the mean of both cosines [m^2]; friction acts symmetrically about that mean."""
         points, _ = whole_points(body.cloud, body.points, self.wall)
-        return self._mean_cosine * float(sectors(body.plates[self.wall].local(points)[:, :2]).sum())
+        return self._mean_cosine * float(sector_areas(body.plates[self.wall].local(points)[:, :2]).sum())
 
     def _area_gradient(self, body: Body) -> Floats:
         """Return the gradient of the wetted area with respect to the vertices of the line, shape (k, 3) [m]."""

@@ -70,7 +70,7 @@ def signed_distance_in_band(points: Floats, triangles: Indices, grid: Grid, band
     return LevelSet(grid, np.where(winding_numbers_on(grid, points, triangles) > 0, -distance, distance))
 
 
-def depths(points: Floats, vertices: Floats, triangles: Indices) -> Floats:
+def measure_depths(points: Floats, vertices: Floats, triangles: Indices) -> Floats:
     """Return the depths of points inside a closed surface, negative outside, shape (n,) [m].
 
     Args:
@@ -130,7 +130,9 @@ def extract_surface(level: LevelSet) -> tuple[Floats, Indices]:
     return points, _split(points, quads)
 
 
-def relax(level: LevelSet, points: Floats, triangles: Indices, rings: Sequence[Indices]) -> tuple[Floats, Indices]:
+def smooth_on_level_set(
+    level: LevelSet, points: Floats, triangles: Indices, rings: Sequence[Indices]
+) -> tuple[Floats, Indices]:
     """Smooth the triangles of a surface: tangential smoothing, projection onto the level set, Delaunay flips.
 
     Args:
@@ -144,14 +146,14 @@ def relax(level: LevelSet, points: Floats, triangles: Indices, rings: Sequence[I
     """
     heights = [points[ring, 2].mean() for ring in rings]
     for _ in range(RELAXATIONS):
-        points = project(level, points + smoothing_offsets(points, triangles, len(points), rings))
+        points = project_onto_level_set(level, points + smoothing_offsets(points, triangles, len(points), rings))
         for ring, height in zip(rings, heights, strict=True):
             points[ring, 2] = height
         triangles, _ = flip_to_delaunay(points, triangles, rings)
     return points, triangles
 
 
-def project(level: LevelSet, points: Floats) -> Floats:
+def project_onto_level_set(level: LevelSet, points: Floats) -> Floats:
     """Move points near the zero level onto it by one Newton step along the gradient; return them, shape (n, 3) [m]."""
     gradient = level.gradient(points)
     return points - (level.at(points) / (gradient**2).sum(axis=1))[:, None] * gradient

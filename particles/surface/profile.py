@@ -132,7 +132,7 @@ def fit_areas(areas: Callable[[Floats], Floats], low: float, high: float) -> Pro
     return Profile.of(Legendre.fit(heights, areas(heights), DEGREE, domain=[low, high]))
 
 
-def width(points: Floats) -> float:
+def mean_width(points: Floats) -> float:
     """Return the horizontal width of a surface with vertices (m, 3) [m], averaged over directions [m]."""
     angles = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     along = points[:, :2] @ np.stack((np.cos(angles), np.sin(angles)))

@@ -19,7 +19,7 @@ from reflowshock.particles.core.grid import Grid
 from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.core.surface_measure import triangle_areas
 from reflowshock.particles.core.winding_numbers import WindingNumbers
-from reflowshock.particles.surface.breakup import small_parts
+from reflowshock.particles.surface.breakup import find_small_parts
 from reflowshock.particles.surface.cloud_level_set import (
     CannotRebuild,
     area_within,
@@ -29,7 +29,7 @@ from reflowshock.particles.surface.cloud_level_set import (
     with_mirror_image,
 )
 from reflowshock.particles.surface.edge_changes import NewSurface, collapse_short, split_long
-from reflowshock.particles.surface.level_set import LevelSet, extract_surface, relax, signed_distance
+from reflowshock.particles.surface.level_set import LevelSet, extract_surface, signed_distance, smooth_on_level_set
 from reflowshock.particles.surface.morphological_closing import TopologyChange, close_gaps, count_parts, narrowest_gap
 from reflowshock.particles.surface.surface_mesh import TOUCH, SurfaceMesh
 from reflowshock.particles.surface.surface_quality import flip_to_delaunay, smoothing_offsets, vertex_normals
@@ -124,7 +124,7 @@ class SurfaceRemeshing:
         """Triangulate the surface from its signed distance, for one of the reasons in ``GAPS``."""
         parts, energy_before, gaps = count_parts(mesh.triangles), energy(mesh), GAPS[reason]
         _, wait = self.waits.get(reason, (0, 1))
-        new = rebuilt_from_distance(mesh.points, mesh.triangles, mesh.has_wall, mesh.spacing, gaps)
+        new = rebuild_from_distance(mesh.points, mesh.triangles, mesh.has_wall, mesh.spacing, gaps)
         wait = 1 if new else min(2 * wait, LONGEST_WAIT)
         self.rebuilds, self.waits[reason] = self.rebuilds + 1, (self.steps + wait * INTERVAL, wait)
         if new:
@@ -135,7 +135,7 @@ class SurfaceRemeshing:
 
     def detach_small_parts(self, mesh: SurfaceMesh) -> float:
         """Remove the surface of parts that are too small for particles; return the volume they enclosed [m^3]."""
-        is_small, volume = small_parts(mesh.points, mesh.triangles, FEWEST * mesh.spacing**3)
+        is_small, volume = find_small_parts(mesh.points, mesh.triangles, FEWEST * mesh.spacing**3)
         if is_small.any():
             mesh.replace(mesh.points, mesh.triangles[~is_small])
             self.detachments += 1
@@ -144,7 +144,7 @@ class SurfaceRemeshing:
 
 def _improve(mesh: SurfaceMesh) -> None:
     """Close dry spots, split and collapse edges, and smooth the triangles."""
-    if closed := without_dry_spots(mesh.points, mesh.triangles, mesh.rings, mesh.spacing):
+    if closed := cover_dry_spots(mesh.points, mesh.triangles, mesh.rings, mesh.spacing):
         mesh.replace(*closed)
     try:
         for change in edge_changes(mesh.spacing):
@@ -152,7 +152,7 @@ def _improve(mesh: SurfaceMesh) -> None:
             if len(new.triangles) != len(mesh.triangles):
                 mesh.replace(0.5 * (mesh.points[new.first] + mesh.points[new.second]), new.triangles)
         lines = mesh.rings + mesh.ground_lines()
-        mesh.points, mesh.triangles = smoothed(mesh.points, mesh.triangles, mesh.rings, lines)
+        mesh.points, mesh.triangles = smooth_surface(mesh.points, mesh.triangles, mesh.rings, lines)
     except CannotRebuild:  # contact lines meet in a point: uneven triangles serve until these have separated
         return
 
@@ -177,7 +177,7 @@ def edge_changes(spacing: float) -> Sequence[Callable[[Floats, Indices, Sequence
     return partial(split_long, longest=long, on_rings=True), partial(collapse_short, shortest=short, on_rings=True)
 
 
-def without_dry_spots(
+def cover_dry_spots(
     points: Floats, triangles: Indices, rings: Sequence[Indices], spacing: float
 ) -> tuple[Floats, Indices] | None:
     """Cover dry spots of the wall that are smaller than a particle with a film.
@@ -215,7 +215,7 @@ def triangulate(level: LevelSet, has_wall: bool) -> tuple[Floats, Indices, tuple
     return points, triangles, boundary_loops(triangles)
 
 
-def rebuilt_from_distance(
+def rebuild_from_distance(
     points: Floats, triangles: Indices, has_wall: bool, spacing: float, gaps: Sequence[float]
 ) -> tuple[Floats, Indices] | None:
     """Rebuild a surface from its signed distance, with narrow gaps filled.
@@ -242,11 +242,11 @@ def rebuilt_from_distance(
             continue
         wet = sum(area_within(new_points[ring]) for ring in lines)
         if gap < 0.0 or wet >= (1.0 - LOST_FILM) * wetted:
-            return relax(level, new_points, new_triangles, lines)
+            return smooth_on_level_set(level, new_points, new_triangles, lines)
     return None
 
 
-def smoothed(
+def smooth_surface(
     points: Floats, triangles: Indices, rings: Sequence[Indices], lines: Sequence[Indices]
 ) -> tuple[Floats, Indices]:
     """Smooth the triangles along the surface and flip edges; return new vertices (m, 3) [m] and triangles (t, 3).

@@ -87,7 +87,7 @@ class SurfaceMesh:
         area = volume_and_gradient(self.points, self.triangles, (), ())[1]
         for ring in self.rings:
             area[ring, 2] = 0.0
-        return area if self.ground is None else solid_ground.tangential(area, self.wetness, self.ground_normals)
+        return area if self.ground is None else solid_ground.remove_normal_part(area, self.wetness, self.ground_normals)
 
     def normals(self) -> Floats:
         """Return outward unit normals, shape (m, 3): along the wall on contact lines, zero on the ground."""
@@ -143,14 +143,16 @@ class SurfaceMesh:
         if self.ground is None or not len(self.points):
             return
         normals = vertex_normals(self.points, self.triangles, len(self.points))
-        self.wetness, self.ground_normals = solid_ground.settle(self.ground, self.points, normals, TOUCH * self.spacing)
+        self.wetness, self.ground_normals = solid_ground.settle_on_ground(
+            self.ground, self.points, normals, TOUCH * self.spacing
+        )
 
     def settle_on_wall(self) -> None:
         """Keep vertices above the wall and contact lines on it; remove triangles that have reached it."""
         for ring in self.rings:
             self.points[ring, 2] = 0.0
         np.maximum(self.points[:, 2], 0.0, out=self.points[:, 2])
-        flat = np.flatnonzero(on_wall(self.points, self.triangles, self.spacing))
+        flat = np.flatnonzero(have_reached_wall(self.points, self.triangles, self.spacing))
         if len(flat):
             self.replace(self.points, np.delete(self.triangles, flat, axis=0))
 
@@ -168,7 +170,7 @@ class SurfaceMesh:
         return (volume - enclosed) / size.sum() * gradient / np.maximum(size, 1e-300)[:, None]
 
 
-def on_wall(points: Floats, triangles: Indices, spacing: float) -> NDArray[np.bool_]:
+def have_reached_wall(points: Floats, triangles: Indices, spacing: float) -> NDArray[np.bool_]:
     """Return whether each triangle has reached the wall z = 0, shape (t,).
 
     Triangles that face the wall wet it at a height of ``TOUCH`` spacings; a film, whose triangles face away from the

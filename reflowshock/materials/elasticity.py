@@ -23,7 +23,11 @@ def elasticity_matrix(material: Material) -> NDArray[np.float64]:
 
 
 def compliance_matrix(constants: EngineeringConstants) -> NDArray[np.float64]:
-    """Return the compliance matrix of an orthotropic material along its axes, shape (6, 6) [1/Pa]."""
+    """Return the compliance matrix of an orthotropic material along its axes, shape (6, 6) [1/Pa].
+
+    Args:
+        constants: Young's moduli and shear moduli [Pa] and Poisson's ratios; rows and columns are ordered as strains.
+    """
     compliance = np.diag(1.0 / np.array([*constants.young, *constants.shear]))
     for ratio, (i, j) in zip(constants.poisson, ((0, 1), (1, 2), (0, 2)), strict=True):
         compliance[i, j] = compliance[j, i] = -ratio / constants.young[i]

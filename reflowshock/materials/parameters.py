@@ -20,7 +20,7 @@ Expansion = Annotated[float | None, Quantity("ppm/K")]
 
 
 class Expanding(Parameters):
-    """Base of materials with coefficients of thermal expansion, which are optional at constant temperature."""
+    """Base of materials: thermal expansion, which is optional at constant temperature, and elastic by default."""
 
     EXPANSION: ClassVar[tuple[str, str, str]]
 
@@ -28,6 +28,11 @@ class Expanding(Parameters):
     def unknown_expansion(self) -> tuple[str, ...]:
         """Names of the missing coefficients of thermal expansion."""
         return tuple(name for name in dict.fromkeys(self.EXPANSION) if getattr(self, name) is None)
+
+    @property
+    def yield_constants(self) -> tuple[float, ...] | None:
+        """Constants of ``plasticity.plastic_constants``; None for an elastic material."""
+        return None
 
     @property
     def expansion(self) -> tuple[float, float, float]:
@@ -57,7 +62,11 @@ class EngineeringConstants(NamedTuple):
 
 
 def inadmissible(allowed: str) -> PydanticCustomError:
-    """Return the error of an elastic constant for which the strain energy is not positive."""
+    """Return a validation error of an elastic constant for which the strain energy is not positive.
+
+    Args:
+        allowed: Allowed range of the constant in words, for the message.
+    """
     message = "contradicts the values above it: the strain energy would not be positive"
     return PydanticCustomError("inadmissible", message, {"allowed": allowed})
 
@@ -96,7 +105,7 @@ class JohnsonCook(Parameters):
 class Isotropic(Expanding):
     """Isotropic linear elastic material, plastic if ``plasticity`` is given.
 
-    ``temperature`` is that of the material during the shock; it lowers the yield stress.
+    ``temperature`` is the temperature during the shock, which lowers the yield stress.
     """
 
     EXPANSION: ClassVar[tuple[str, str, str]] = ("thermal_expansion",) * 3
@@ -132,6 +141,14 @@ class Isotropic(Expanding):
     def softening(self) -> float:
         """Factor on the yield stress at the temperature of the material."""
         return 1.0 if self.plasticity is None else self.plasticity.softening(self.temperature)
+
+    @property
+    def yield_constants(self) -> tuple[float, ...] | None:
+        """Constants of ``plasticity.plastic_constants``: 3 G, softened A and B [Pa], n, C, reference rate [1/s]."""
+        law, softening = self.plasticity, self.softening
+        if law is None:
+            return None
+        return 3.0 * self.shear_modulus, law.A * softening, law.B * softening, law.n, law.C, law.reference_rate
 
     @property
     def elastic(self) -> Self:

@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.materials.parameters import Isotropic, Material
+from reflowshock.materials.parameters import Material
 
 NEVER_YIELDS = np.array([1.0, np.inf, 0.0, 1.0, 0.0, 1.0])  # ``plastic_constants`` of an elastic material
 FIRST_YIELD = 1  # column of the initial yield stress, infinite for an elastic material
@@ -31,20 +31,17 @@ def plastic_constants(material: Material) -> NDArray[np.float64]:
         Array of shape (6,): 3 G [Pa], A and B times the thermal softening [Pa], n, C, reference rate [1/s]. A is
         infinite for an elastic material.
     """
-    if not isinstance(material, Isotropic) or material.plasticity is None:
-        return NEVER_YIELDS.copy()
-    law, softening = material.plasticity, material.softening
-    shear = 3.0 * material.shear_modulus
-    return np.array([shear, law.A * softening, law.B * softening, law.n, law.C, law.reference_rate])
+    constants = material.yield_constants
+    return NEVER_YIELDS.copy() if constants is None else np.array(constants)
 
 
 def yield_stress(plastic_strain, rate, constants):
-    """Return the yield stress [Pa] of Johnson and Cook.
+    """Return the yield stress [Pa] of Johnson and Cook at a point; a compiled function of scalars.
 
     Args:
-        plastic_strain: Equivalent plastic strain.
-        rate: Rate of the equivalent plastic strain [1/s].
-        constants: Array of ``plastic_constants``.
+        plastic_strain: Equivalent plastic strain, a scalar.
+        rate: Rate of the equivalent plastic strain, a scalar [1/s].
+        constants: Array of ``plastic_constants``, shape (6,).
     """
     factor = 1.0
     if constants[4] > 0.0 and rate > constants[5]:
@@ -104,7 +101,10 @@ def plastic_increment(trial_mises, plastic_strain, constants, step):
 
 
 def small_power(growth, exponent):
-    """Return (1 + growth)^exponent for growth below ``SMALL_GROWTH``: five terms of the series, exact to 1e-13."""
+    """Return (1 + growth)^exponent for a scalar growth below ``SMALL_GROWTH``.
+
+    Five terms of the series are exact to 1e-13.
+    """
     n, e = exponent, growth
     higher = 1.0 + e * (n - 2.0) * THIRD * (1.0 + 0.25 * e * (n - 3.0) * (1.0 + 0.2 * e * (n - 4.0)))
     return 1.0 + e * n * (1.0 + 0.5 * e * (n - 1.0) * higher)

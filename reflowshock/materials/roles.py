@@ -67,7 +67,7 @@ ELASTIC = Materials(solder=SAC405.elastic)  # step levels of linear elements req
 
 
 def role_of_part(part: str) -> str:
-    """Return the material role of a mesh part: its name up to the first ``@`` or ``_``."""
+    """Return the material role of a mesh part, its name up to the first ``@`` or ``_``: "solder" for "solder@A1"."""
     return part.split("@")[0].split("_")[0]
 
 
@@ -93,6 +93,9 @@ def materials_of_parts(
     Args:
         parts: Names of the parts.
         materials: Materials by role, or a mapping of parts to materials, in which the name of a part is its role.
+
+    Returns:
+        Roles and materials, both in the order of ``parts``.
 
     Raises:
         ValueError: A part has no material.

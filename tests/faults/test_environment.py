@@ -24,6 +24,7 @@ ENVIRONMENTS = {
     "POSIX": {"LC_ALL": "POSIX", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"},
     "another encoding": {"PYTHONIOENCODING": "iso-8859-1", "LC_ALL": "C", "PYTHONCOERCECLOCALE": "0"},
 }
+QUICK = ("nothing", "C", "another encoding")
 
 
 @pytest.fixture
@@ -52,7 +53,9 @@ def is_plain(text: bytes) -> bool:
     return not any(byte in text for byte in (b"\x1b", b"\x07", b"Traceback", b"\xc2\x9b"))
 
 
-@pytest.mark.parametrize("name", ENVIRONMENTS)
+@pytest.mark.parametrize(
+    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in ENVIRONMENTS]
+)
 def test_a_plan_in_any_environment(user_folder, name):
     done = command(user_folder, "plan", "case.toml", "--out", "Gehäuse [x] ü", environment=ENVIRONMENTS[name])
     assert (done.returncode, done.stderr.decode()) == (0, "")

@@ -40,7 +40,7 @@ def test_products_of_another_time_are_products(drop_folder):
     assert "ok     reflow" in other.stdout
 
 
-def test_a_folder_that_cannot_be_taken_is_told_before_anything(tmp_path):
+def test_an_unusable_folder_is_reported_before_anything_runs(tmp_path):
     (tmp_path / "file").write_text("mine")
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine/notes.txt").write_text("mine")

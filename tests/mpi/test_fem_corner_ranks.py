@@ -8,7 +8,7 @@ SCRIPT = """
 import contextlib, json, sys
 import numpy as np
 from mpi4py import MPI
-from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, make_body, make_rank_elements
 from reflowshock.fem.parallel.communicators import Communicators
 from reflowshock.fem.coupling.participants import couple
 from reflowshock.fem.estimates.placement import shared
@@ -39,10 +39,10 @@ def moved(scheme):
         centre = item.mesh.points[item.mesh.cells].mean(axis=1)
         ranks = quarters(centre, corner if role == "macro" else corner / 3)
         mesh = (item.mesh, ranks) if world.rank == 0 else (None, None)
-        pieces = make_pieces(distribute(comms.models[role], *mesh), item.tables, ELASTIC)
+        rank_elements = make_rank_elements(distribute(comms.models[role], *mesh), item.tables, ELASTIC)
         step = division.plan.window if role == "macro" else division.meso_step
-        factor = np.ones(len(pieces.steps))
-        bodies[role] = make_body(comms.models[role], pieces, item.tables, factor, ForceOptions(step=step))
+        factor = np.ones(len(rank_elements.steps))
+        bodies[role] = make_body(comms.models[role], rank_elements, item.tables, factor, ForceOptions(step=step))
     at_corner = [(np.abs(body.local.points[:, :2] - corner).max(axis=1) < 1e-9).any() for body in bodies.values()]
     participants, _, found = couple(comms, bodies, dict.fromkeys(bodies, []), division.plan, scheme_of(scheme))
     for part in participants.values():

@@ -11,7 +11,7 @@ import json, sys
 from pathlib import Path
 import numpy as np
 from mpi4py import MPI
-from reflowshock.fem.model.assembly import make_body, make_pieces
+from reflowshock.fem.model.assembly import make_body, make_rank_elements
 from reflowshock.fem.forces.energy import Energy
 from reflowshock.fem.output.fields import Fields
 from reflowshock.fem.loads.load import half_sine_drop
@@ -27,10 +27,10 @@ for name, kind in KINDS.items():
     points, cells = box(kind, np.linspace(0, 4e-3, 5), np.linspace(0, 2e-3, 3), np.linspace(0, 1e-3, 3))
     item = prepare(MeshData(points, cells, np.zeros(len(cells), np.int32), ("board",), {}), "dns")["dns"]
     local = distribute(comm, item.mesh if comm.rank == 0 else None)
-    pieces = make_pieces(local, item.tables, ELASTIC, name if kind.nodes == 8 else "incompatible_modes")
-    body = make_body(comm, pieces, item.tables, np.ones(len(pieces.steps)))
+    rank_elements = make_rank_elements(local, item.tables, ELASTIC, name if kind.nodes == 8 else "incompatible_modes")
+    body = make_body(comm, rank_elements, item.tables, np.ones(len(rank_elements.steps)))
     body.free[body.local.points[:, 0] < 1e-9] = False
-    step = 0.9 * comm.allreduce(float(pieces.steps.min(initial=np.inf)), MPI.MIN)
+    step = 0.9 * comm.allreduce(float(rank_elements.steps.min(initial=np.inf)), MPI.MIN)
     motion = ExplicitMotion(body, [half_sine_drop(1e4, 5e-5)], step, np.empty(0, np.int32), np.zeros(len(body.mass)))
     for _ in range(100):
         motion.advance()

@@ -8,7 +8,7 @@ SCRIPT = """
 import json, sys
 import numpy as np
 from mpi4py import MPI
-from reflowshock.fem.model.assembly import make_body, make_pieces
+from reflowshock.fem.model.assembly import make_body, make_rank_elements
 from reflowshock.fem.model.global_matrix import Equations
 from reflowshock.fem.dynamics.implicit import ImplicitMotion
 from reflowshock.fem.loads.load import half_sine_drop
@@ -21,8 +21,8 @@ from tests.support.fem_models import small_assembly
 
 comm = MPI.COMM_WORLD
 item = prepare(append(small_assembly(2, size=1e-3)), "dns")["dns"]
-pieces = make_pieces(distribute(comm, item.mesh if comm.rank == 0 else None), item.tables, ELASTIC)
-body = make_body(comm, pieces, item.tables, np.ones(len(pieces.steps)))
+rank_elements = make_rank_elements(distribute(comm, item.mesh if comm.rank == 0 else None), item.tables, ELASTIC)
+body = make_body(comm, rank_elements, item.tables, np.ones(len(rank_elements.steps)))
 equations = Equations.of(comm, body)
 motion = ImplicitMotion(comm, body, [half_sine_drop(1e4, 5e-5)], 2e-6)
 for _ in range(10):

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from reflowshock.cases.hard.trials.bodies import SOLDER
 from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
-from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, make_body, make_rank_elements
 from reflowshock.fem.parallel import checkpoint_state
 from reflowshock.fem.parallel.checkpoint_state import State
 from reflowshock.fem.parallel.local_mesh import distribute
@@ -27,8 +27,10 @@ def begun(comm: MPI.Comm) -> ExplicitMotion:
     height = item.mesh.points[item.mesh.cells, 2].mean(axis=1)
     item.tables.every[:] = np.select([height < -0.5e-3, height < -0.2e-3], [8, 4], 1)
     local = distribute(comm, item.mesh if comm.rank == 0 else None)
-    pieces = make_pieces(local, item.tables, Materials(solder=SOLDER), "one_point")
-    body = make_body(comm, pieces, item.tables, np.ones(len(pieces.steps)), ForceOptions("corotational", STEP))
+    rank_elements = make_rank_elements(local, item.tables, Materials(solder=SOLDER), "one_point")
+    body = make_body(
+        comm, rank_elements, item.tables, np.ones(len(rank_elements.steps)), ForceOptions("corotational", STEP)
+    )
     motion = ExplicitMotion(body, [], STEP, np.empty(0, np.int32), np.zeros(len(body.mass)))
     away = RATE * (body.local.points - CENTRE)
     motion.velocity[:] = np.column_stack([3 * away[:, 2], away[:, 0], -2 * away[:, 0]])

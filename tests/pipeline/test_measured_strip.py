@@ -9,7 +9,7 @@ from scipy.signal import butter, hilbert, sosfiltfilt
 
 from reflowshock.fem.loads.pulse import STANDARD_GRAVITY
 from reflowshock.fem.loads.pulse_table import read_pulse
-from reflowshock.fem.output.acceleration import Acceleration, low_passed
+from reflowshock.fem.output.acceleration import Acceleration, apply_low_pass
 from reflowshock.fem.problem.filters import LowPass
 from tests.support.warm_start import warm_command
 
@@ -27,7 +27,7 @@ def record(impact: str, column: str) -> tuple[np.ndarray, np.ndarray]:
 
 def filtered(impact: str) -> Acceleration:
     times, values = record(impact, "board_g")
-    return Acceleration(times, values, low_passed(values, times[1] - times[0], LowPass()))
+    return Acceleration(times, values, apply_low_pass(values, times[1] - times[0], LowPass()))
 
 
 def test_first_frequency_and_damping_of_the_record():

@@ -11,10 +11,10 @@ import psutil
 import pytest
 
 from reflowshock.workflow.case.run import Run
-from reflowshock.workflow.jobs.batch import Machine, missing, run_points
+from reflowshock.workflow.jobs.batch import Machine, list_missing, run_points
 from reflowshock.workflow.pipeline.stage_runner import run_stage
 from reflowshock.workflow.stages import stage_function
-from reflowshock.workflow.store.folders import locked
+from reflowshock.workflow.store.folders import lock_folder
 from reflowshock.workflow.store.store import Store
 from reflowshock.workflow.study.command import read_points_of, run_study
 from tests.support.warm_start import warm_python
@@ -54,7 +54,7 @@ def test_a_study_is_computed_once_and_survives_a_kill(tmp_path, monkeypatch):
     assert [line["result"] for line in lines] == ["healthy", "failed"]
     assert lines[1]["message"].startswith("stage reflow: ")
     assert float(lines[0]["height [m]"]) == pytest.approx(5.8e-4, rel=0.01)
-    assert [job.stage for job in missing(store, [good, bad], "report")] == ["reflow", "report"]
+    assert [job.stage for job in list_missing(store, [good, bad], "report")] == ["reflow", "report"]
 
     summary = json.loads((store.run_folder(good) / "summary.json").read_text())
     stage, run = stage_function(good.case, "reflow"), Run(tmp_path / "run", good.case, cores=1)
@@ -65,9 +65,9 @@ def test_a_study_is_computed_once_and_survives_a_kill(tmp_path, monkeypatch):
     assert stored["health"] == record["health"]
 
     written = (store.run_folder(good) / "report.html").stat().st_mtime_ns
-    with locked(store.folder, "study", "drops") as lock:
+    with lock_folder(store.folder, "study", "drops") as lock:
         assert run_points(store, [good], "report", Machine(cores=2), lock) == {}
     assert (store.run_folder(good) / "report.html").stat().st_mtime_ns == written
     path.write_text(STUDY.replace("20000, ", "20000, 10000, "))
     more = list(read_points_of(path).possible.values())
-    assert [job.point.settings for job in missing(store, more[:2], "report")] == 2 * [more[1].settings]
+    assert [job.point.settings for job in list_missing(store, more[:2], "report")] == 2 * [more[1].settings]

@@ -87,6 +87,7 @@ def test_it_fits_the_window(page, width):
     assert page.value("document.documentElement.scrollWidth") <= width
 
 
+@pytest.mark.long
 def test_it_prints(page, tmp_path):
     page.pdf(tmp_path / "page.pdf")
     assert (tmp_path / "page.pdf").read_bytes().startswith(b"%PDF") and page.errors == []

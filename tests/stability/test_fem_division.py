@@ -9,7 +9,7 @@ from reflowshock.cases.hard.trials.layouts import board, copper_interface, corne
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.coupling.self_check import self_check
 from reflowshock.fem.division.checks import check_division
-from reflowshock.fem.division.divide import cut_nodes, divide, held
+from reflowshock.fem.division.divide import cut_nodes, divide, held_velocity_division
 from reflowshock.fem.division.whole import touching
 from reflowshock.fem.errors import CouplingError
 from reflowshock.fem.mesh.mesh import MeshData, append
@@ -32,10 +32,8 @@ def test_cut_through_copper_and_board_is_stable_in_local_steps():
     assert {"board", "copper"} <= set(scene[1].role[at_interface & division.macro])
     assert "copper" in scene[1].role[at_interface & division.meso]
     assert radius(mesh, "local_steps") <= 1 + 1e-8
-    with pytest.raises(
-        CouplingError, match=r"must belong to the board, found \d+ of copper.*scheme = local_steps"
-    ):
-        check_division(*scene[:2], held(*scene, division.meso), scene[2])
+    with pytest.raises(CouplingError, match=r"must belong to the board, found \d+ of copper.*scheme = local_steps"):
+        check_division(*scene[:2], held_velocity_division(*scene, division.meso), scene[2])
 
 
 @pytest.mark.parametrize("scheme", ["held_velocity", "local_steps"])

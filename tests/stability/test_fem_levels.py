@@ -10,7 +10,7 @@ from mpi4py import MPI
 
 from reflowshock.fem.division import chebyshev
 from reflowshock.fem.division.chebyshev import Substeps
-from reflowshock.fem.division.choose_levels import Pace, governing_steps, least_steps
+from reflowshock.fem.division.choose_levels import StepLimits, governing_steps, least_steps
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.mesh.tie import Tie
@@ -34,7 +34,7 @@ def chain_stiffness(levels: np.ndarray, stiffness: np.ndarray, chosen: int) -> n
 
 
 def chain_effective(
-    levels: np.ndarray, stiffness: np.ndarray, mass: np.ndarray, ratios: tuple[int, ...], pace: Pace
+    levels: np.ndarray, stiffness: np.ndarray, mass: np.ndarray, ratios: tuple[int, ...], step_limits: StepLimits
 ) -> np.ndarray:
     """Return K_eff of a chain by executing the substeps for all columns."""
 
@@ -46,7 +46,7 @@ def chain_effective(
             return matrix
         outer = np.zeros(ELEMENTS + 1, dtype=bool)
         outer[CELLS[levels < number]] = True
-        steps, displacement = Substeps.of(ratios[number - 1], number, pace.damping), np.eye(ELEMENTS + 1)
+        steps, displacement = Substeps.of(ratios[number - 1], number, step_limits.damping), np.eye(ELEMENTS + 1)
         change, total = np.zeros_like(displacement), np.zeros_like(displacement)
         for memory, rate, weight in zip(steps.memory, steps.rate, steps.weight, strict=True):
             force = matrix @ displacement
@@ -55,15 +55,15 @@ def chain_effective(
             displacement = displacement + change
         return total
 
-    return effective(0, pace.window)
+    return effective(0, step_limits.window)
 
 
 def extreme_eigenvalues(
     random: np.random.Generator, ratios: tuple[int, ...], fraction: float, damping: float
 ) -> tuple[float, float]:
     """Return the smallest and the largest eigenvalue of DT^2 M^-1 K_eff of a random chain; DT is 1."""
-    pace = Pace(np.ones(ELEMENTS), np.ones(ELEMENTS), 1.0, fraction, damping)
-    limits = least_steps(ratios, pace) / fraction
+    step_limits = StepLimits(np.ones(ELEMENTS), np.ones(ELEMENTS), 1.0, fraction, damping)
+    limits = least_steps(ratios, step_limits) / fraction
     runs = random.integers(1, 7, ELEMENTS)
     level = np.repeat(random.integers(0, len(limits), ELEMENTS), runs)[:ELEMENTS]
     steps = limits[level] * random.uniform(1.0, random.choice([1.0 + 1e-9, 1.3, 4.0]), ELEMENTS)
@@ -72,7 +72,7 @@ def extreme_eigenvalues(
     np.add.at(mass, CELLS, 0.5 * (impedance * steps)[:, None])
     needed = governing_steps(CELLS, Tie.none(), fraction * steps)
     levels = np.sum(needed[:, None] < fraction * limits[:-1], axis=1)
-    matrix = chain_effective(levels, stiffness, mass, ratios, pace)
+    matrix = chain_effective(levels, stiffness, mass, ratios, step_limits)
     assert np.abs(matrix - matrix.T).max() <= 1e-9 * np.abs(matrix).max()
     values = np.linalg.eigvalsh((matrix + matrix.T) / (2.0 * np.sqrt(np.outer(mass, mass))))
     return values[0], values[-1]

@@ -13,7 +13,7 @@ from reflowshock.fem.division.path_levels import opaque_ratio
 from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.mesh.tie import net_load
-from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, make_body, make_rank_elements
 from reflowshock.fem.parallel.checkpoint_state import values
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.materials.roles import Materials
@@ -64,10 +64,10 @@ def free_joint(pace: int) -> ExplicitMotion:
     mesh = joint_on_board(held=False)
     item = prepare(mesh, "dns")["dns"]
     materials = Materials(solder=SOLDER)
-    pieces = make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials, "one_point")
-    step = FRACTION * pieces.steps.min()
-    steps = np.empty(len(pieces.steps))
-    steps[pieces.local.cell_numbers] = pieces.steps
+    rank_elements = make_rank_elements(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials, "one_point")
+    step = FRACTION * rank_elements.steps.min()
+    steps = np.empty(len(rank_elements.steps))
+    steps[rank_elements.local.cell_numbers] = rank_elements.steps
     fine = FRACTION * steps < pace * step
     for _ in range(LAYERS):
         nodes = np.zeros(len(item.mesh.points), dtype=bool)
@@ -76,7 +76,7 @@ def free_joint(pace: int) -> ExplicitMotion:
         fine = nodes[item.mesh.cells].any(axis=1)
     tables = replace(item.tables, every=np.where(fine, 1, pace).astype(np.int32))
     response = ForceOptions("corotational", step)
-    body = make_body(MPI.COMM_SELF, pieces, tables, np.ones(len(pieces.steps)), response)
+    body = make_body(MPI.COMM_SELF, rank_elements, tables, np.ones(len(rank_elements.steps)), response)
     return ExplicitMotion(body, [], step, np.empty(0, np.int32), np.zeros(len(body.mass)))
 
 

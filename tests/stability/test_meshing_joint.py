@@ -78,12 +78,13 @@ def write_whole(folder, the_package, the_board, warpage):
     return counts
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "changes",
     [
-        pytest.param({"rows": 1, "columns": 1}, marks=pytest.mark.long),
+        {"rows": 1, "columns": 1},
         {"rows": 3, "columns": 3, "depopulated": ("B2",)},
-        pytest.param({"rows": 1, "columns": 4, "joint_numerics": {"layers": 2}}, marks=pytest.mark.long),
+        {"rows": 1, "columns": 4, "joint_numerics": {"layers": 2}},
     ],
     ids=["one joint", "centre depopulated", "one row, two layers"],
 )

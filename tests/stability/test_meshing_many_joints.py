@@ -17,6 +17,7 @@ def outcomes():
     return [outcome(sample) for sample in samples(every=10)]
 
 
+@pytest.mark.long
 def test_there_are_two_hundred_of_all_kinds(outcomes):
     assert sum(COUNTS.values()) == 200
     assert {record["kind"] for record in outcomes} == set(COUNTS)

@@ -39,6 +39,7 @@ def test_gap_squeezed_by_40_percent_in_10_steps():
     assert shapes[-1].verdict == "overflow"
 
 
+@pytest.mark.long
 def test_gap_pulled_until_the_neck_ruptures():
     gaps = np.arange(0.35e-3, 1.1e-3, 0.075e-3)
     shapes = follow(gaps)

@@ -61,6 +61,7 @@ def test_time_steps_far_beyond_the_capillary_limit(limit, spacing):
     assert shape.metrics["time_step_over_capillary_limit"][0] > 0.5 * limit
 
 
+@pytest.mark.long
 def test_a_joint_without_equilibrium_opens():
     gap = 0.6e-3
     solder = Solder(volume=cylinder(0.4, gap), numerics=SolderNumerics(spacing=7e-5))

@@ -47,7 +47,7 @@ FAULTS = [
         marks=pytest.mark.long,
     ),
     ("reflow_bond", "bond 1, contact angle 60 deg", lambda patch: flip(patch, Gravity, "force")),
-    ("reflow_swing", "amplitude 0.05, parameters paper", double_step),
+    pytest.param("reflow_swing", "amplitude 0.05, parameters paper", double_step, marks=pytest.mark.long),
     ("remesh_warped", "corner 0.1 mm", flip_shear),
     ("remesh_barrel", "bulge 0.1 mm", forget_volume),
     ("remesh_refused_inside_out", "", forget_check),

@@ -31,7 +31,7 @@ __all__ = ["DOWN", "BodyAcceleration", "HalfSine", "motion_of"]
 G = 9.80665
 SOLDER = Solder(volume=1e-9, pad_contact_angle=np.radians(120.0))
 LENGTH, THICKNESS = 40e-3, 1e-3
-RESTING = {"gravity": True, "surface_tension": True, "wall_adhesion": True, "inertia": False, "viscosity": False}
+RESTING = {"gravity": True, "surface_tension": True, "wall_adhesion": True}
 RHEOLOGY = "tests/unit/particles/test_rheology.py"
 FREEZING = "tests/unit/particles/test_freezing.py"
 FLOWS, DROPLETS = (f"tests/verification/test_particles_{name}.py" for name in ("flows", "droplets"))
@@ -96,7 +96,7 @@ def flow_with(acting: Mapping[str, bool], count: int = 5, solder: Solder = SOLDE
 
 def without(physics: Physics, kind: type) -> Physics:
     """Return the lists of acting objects without those of one kind."""
-    lists = {item.name: getattr(physics, item.name) for item in fields(physics)}
+    lists = {item.name: old for item in fields(physics) if isinstance(old := getattr(physics, item.name), tuple)}
     return replace(physics, **{name: tuple(x for x in old if not isinstance(x, kind)) for name, old in lists.items()})
 
 

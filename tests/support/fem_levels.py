@@ -7,11 +7,11 @@ from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.grids import grid, joint_mesh, mesh_of, on
 from reflowshock.fem.division.chebyshev import stabilisation
-from reflowshock.fem.division.choose_levels import Pace, governing_steps, least_steps
+from reflowshock.fem.division.choose_levels import StepLimits, governing_steps, least_steps
 from reflowshock.fem.division.tables import prepare
 from reflowshock.fem.elements.element import element_stiffness
 from reflowshock.fem.mesh.mesh import MeshData, append
-from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, make_body, make_rank_elements
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.materials.roles import Materials
@@ -50,20 +50,20 @@ def levelled(
 ) -> Levelled:
     """Return a body whose smallest elements take the innermost step; ``damping``: beta over the window."""
     item = prepare(mesh, "dns")["dns"]
-    alone = make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials)
+    alone = make_rank_elements(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials)
     steps = np.empty(len(alone.steps))
     steps[alone.local.cell_numbers] = alone.steps
-    least = least_steps(ratios, Pace(steps, np.ones(len(steps)), 1.0, FRACTION, damping))
+    least = least_steps(ratios, StepLimits(steps, np.ones(len(steps)), 1.0, FRACTION, damping))
     window = FRACTION * min(steps.max() / least[0], steps.min() / least[-1])
-    pace = Pace(steps, np.ones(len(steps)), window, FRACTION, damping * window)
+    step_limits = StepLimits(steps, np.ones(len(steps)), window, FRACTION, damping * window)
     needed = governing_steps(item.mesh.cells, item.tables.tie, FRACTION * steps)
-    level = np.sum(needed[:, None] < least_steps(ratios, pace)[:-1], axis=1, dtype=np.int32)
+    level = np.sum(needed[:, None] < least_steps(ratios, step_limits)[:-1], axis=1, dtype=np.int32)
     tables = replace(item.tables, level=level, ratios=ratios)
-    pieces = make_pieces(distribute(comm, item.mesh if comm.rank == 0 else None), item.tables, materials)
-    factor = np.ones(len(pieces.steps))
-    body = make_body(comm, pieces, tables, factor, ForceOptions("small", window, damping * window))
-    plain = make_body(comm, pieces, item.tables, factor)
-    return Levelled(body, plain, level[pieces.local.cell_numbers], ratios, window)
+    rank_elements = make_rank_elements(distribute(comm, item.mesh if comm.rank == 0 else None), item.tables, materials)
+    factor = np.ones(len(rank_elements.steps))
+    body = make_body(comm, rank_elements, tables, factor, ForceOptions("small", window, damping * window))
+    plain = make_body(comm, rank_elements, item.tables, factor)
+    return Levelled(body, plain, level[rank_elements.local.cell_numbers], ratios, window)
 
 
 def dense_level_stiffness(model: Levelled, number: int) -> np.ndarray:

@@ -7,14 +7,14 @@ import numpy as np
 from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
-from reflowshock.fem.division.tables import joined, model_inputs
+from reflowshock.fem.division.tables import join_meshes, model_inputs
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.supports import SYMMETRY
-from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, make_body, make_rank_elements
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.stress_recovery import StressRecovery
 from reflowshock.fem.parallel.local_mesh import distribute
-from reflowshock.fem.run.cooling import pinned
+from reflowshock.fem.run.cooling import add_pins
 from reflowshock.fem.statics.equilibrium import Equilibrium, Statics, thermal_force
 from reflowshock.fem.statics.initial_state import with_initial_stress
 from reflowshock.materials.parameters import Material
@@ -59,20 +59,20 @@ def cooled(
     response: ForceOptions = SMALL,
 ) -> Cooled:
     """Cool a mesh on its symmetry planes and return bodies without and with the initial stress."""
-    item = pinned(model_inputs(joined(mesh), "dns", SYMMETRY)["dns"])
-    pieces = make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials, formulation)
+    item = add_pins(model_inputs(join_meshes(mesh), "dns", SYMMETRY)["dns"])
+    rank_elements = make_rank_elements(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials, formulation)
 
     def body() -> Body:
-        return make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)), response)
+        return make_body(MPI.COMM_SELF, rank_elements, item.tables, np.ones(len(rank_elements.steps)), response)
 
-    equilibrium = Statics(MPI.COMM_SELF, body(), pieces.materials, change).solve()
+    equilibrium = Statics(MPI.COMM_SELF, body(), rank_elements.materials, change).solve()
     plain = body()
     return Cooled(
         plain,
         equilibrium,
-        with_initial_stress(body(), pieces.materials, equilibrium.displacement, change, path=True),
-        float(pieces.steps.min()),
-        thermal_force(plain, slice(None), pieces.materials, change),
+        with_initial_stress(body(), rank_elements.materials, equilibrium.displacement, change, path=True),
+        float(rank_elements.steps.min()),
+        thermal_force(plain, slice(None), rank_elements.materials, change),
     )
 
 

@@ -16,7 +16,7 @@ from reflowshock.cases.hard.trials.pairs import FRACTION, Pair
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.forces.force import ForceTerm
 from reflowshock.fem.forces.force_assembled import AssembledElements
-from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, make_body, make_rank_elements
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.step_levels import upper_blocks
 from reflowshock.fem.problem.shock import Coupling
@@ -77,8 +77,8 @@ def flowing_pair(pair: Pair, coupling: Coupling, fraction: float = FRACTION, for
     models = models_of(pair.mesh(), materials, coupling, fraction)
     response = ForceOptions("corotational", models.division.meso_step)
     bodies = {}
-    for role, (pieces, tables) in models.parts.items():
-        fresh_pieces = make_pieces(pieces.local, tables, materials, formulation)
-        body = make_body(MPI.COMM_SELF, fresh_pieces, tables, np.ones(len(fresh_pieces.steps)), response)
+    for role, (rank_elements, tables) in models.parts.items():
+        fresh_elements = make_rank_elements(rank_elements.local, tables, materials, formulation)
+        body = make_body(MPI.COMM_SELF, fresh_elements, tables, np.ones(len(fresh_elements.steps)), response)
         bodies[role] = flowing(body)
     return Coupled(bodies, models.division.plan, scheme_of(models.division.scheme))

@@ -21,7 +21,7 @@ from reflowshock.cases.hard.trials.packages import MM, board, package
 from reflowshock.cases.hard.trials.surfaces import barrel
 from reflowshock.fem.cell_shape import HEXAHEDRON
 from reflowshock.fem.division.split import part_of
-from reflowshock.fem.division.tables import joined
+from reflowshock.fem.division.tables import join_meshes
 from reflowshock.fem.division.whole import Whole
 from reflowshock.fem.elements.mesh_elements import elements_of
 from reflowshock.fem.elements.stress import von_mises
@@ -36,7 +36,7 @@ from reflowshock.materials.roles import role_of_part
 from reflowshock.meshing.board.package_side import PackageSide, StructuredFace, underside
 from reflowshock.meshing.board.pads import PadSite, pad_table
 from reflowshock.meshing.board.parameters import Imprint, JointNumerics, Package, Warpage
-from reflowshock.meshing.joint.attempts import first_good, free_form
+from reflowshock.meshing.joint.attempts import first_valid_mesh, free_form
 from reflowshock.meshing.joint.column import Column, columns_of
 from reflowshock.meshing.joint.joint_mesh import CopperPads, JointMesh, JointPlace, build_joint
 from reflowshock.meshing.joint.solder_mesh import mesh_joint
@@ -99,7 +99,7 @@ def patch(mesh: Mesh) -> tuple[Whole, JointMesh]:
     joint = how(barrel(site.gap, 0.0), site, package_of_joint, side, columns_of(site, package_of_joint, below, side))
     depths = below.thickness * (np.arange(mesh.layers[0] + 1) / mesh.layers[0] - 1.0)
     pieces = [boxes("board", lines, depths), boxes("substrate", lines, levels), data_of(joint)]
-    return joined(append(pieces)), joint
+    return join_meshes(append(pieces)), joint
 
 
 def free_form_joint(
@@ -109,7 +109,7 @@ def free_form_joint(
     copper = CopperPads(whole.copper.thickness, whole.joint_numerics.copper_layers, columns=columns)
     joint_place = JointPlace.of(surface, site, side, copper.thickness)
     build = partial(build_joint, sites=[site], copper=copper, place=joint_place)
-    return first_good(surface, free_form(surface, whole.joint_numerics, joint_place), site.name, build)
+    return first_valid_mesh(surface, free_form(surface, whole.joint_numerics, joint_place), site.name, build)
 
 
 def box_lines(mesh: Mesh) -> Floats:

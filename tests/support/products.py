@@ -8,7 +8,7 @@ from reflowshock.workflow.case.run import Findings, Run
 from reflowshock.workflow.jobs.batch import show_products
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.pipeline.stage_runner import run_stage
-from reflowshock.workflow.store.folders import locked
+from reflowshock.workflow.store.folders import lock_folder
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import seal
 from reflowshock.workflow.store.store import Store
@@ -47,7 +47,7 @@ def record_of(product: Path, **entries: object) -> None:
 def shown_run(folder: Path) -> Store:
     """Return the store of a run folder that shows all products of the shortened case."""
     store = Store(folder, one_run=True)
-    with locked(store.folder, "run", "small"):
+    with lock_folder(store.folder, "run", "small"):
         make(store, POINT, POINT.case.pipeline.names)
         show_products(store, POINT)
     return store

@@ -48,7 +48,7 @@ def test_overrides(overrides):
     assert case.resolved.shock.peak_acceleration == pytest.approx(9806.65)
 
 
-def test_a_wrong_key_is_told_the_nearest():
+def test_a_wrong_key_names_the_nearest():
     with pytest.raises(reflowshock.CaseError, match=r"did you mean shock\.peak_acceleration"):
         reflowshock.Case.load(BGA, {"shock.peak_aceleration": "1000 G"})
 

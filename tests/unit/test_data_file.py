@@ -98,7 +98,7 @@ def test_any_flipped_bit_is_noticed(tmp_path):
 
 
 @pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
-def test_a_file_that_is_none_is_refused_and_not_executed(tmp_path, damage):
+def test_a_damaged_file_is_rejected_and_not_executed(tmp_path, damage):
     path, marker = tmp_path / "file", tmp_path / "marker"
     write_data(path, {"owner": "me"}, {"points": np.arange(100.0)})
     path.write_bytes(damage(path.read_bytes(), marker))

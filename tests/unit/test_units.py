@@ -73,7 +73,7 @@ def test_quantities_become_si(text, unit, value):
         ("1 mm*deg", "contains the bare number degree"),
     ],
 )
-def test_what_is_no_length_is_refused(text, words):
+def test_values_that_are_not_lengths_are_rejected(text, words):
     with pytest.raises(UnitError) as caught:
         to_si(text, "mm")
     assert words in str(caught.value)

@@ -35,8 +35,9 @@ from reflowshock.fem.statics.plates import RigidPlates
 from reflowshock.fem.statics.structure import ThermalStructure
 from reflowshock.materials.library import FR4, SAC305, SILICON
 from reflowshock.materials.plasticity import plastic_constants
-from reflowshock.parameters import changed
-from reflowshock.particles.parameters.effects import NEGLIGIBLE_SHAPE_CHANGE, decide, decide_drop, drop_numbers
+from reflowshock.parameters import with_value
+from reflowshock.particles.parameters.effect_gravity import NEGLIGIBLE_SHAPE_CHANGE
+from reflowshock.particles.parameters.effects import LIQUID_EFFECTS, decide, decide_drop, drop_numbers
 from reflowshock.particles.parameters.solder import SolderEffects
 from reflowshock.workflow.board_drop.fine_joints import needs_coarse_joints
 from reflowshock.workflow.case.case import CASES
@@ -75,7 +76,7 @@ def test_off_costs_nothing(name, tmp_path):
 
 @pytest.mark.parametrize("name", registry())
 def test_irrelevant_effect_changes_almost_nothing(name, tmp_path):
-    covering_test = ELSEWHERE_ON.get(name)
+    covering_test = ELSEWHERE_ON.get(name) or own_test(name)
     exists(covering_test) if covering_test else ON[name](registry()[name], tmp_path)
 
 
@@ -83,6 +84,12 @@ def test_irrelevant_effect_changes_almost_nothing(name, tmp_path):
 def test_object_is_at_its_registered_location(name):
     module, _, attribute = registry()[name].implementation.rpartition(".")
     assert hasattr(import_module(module), attribute)
+
+
+def own_test(name: str) -> str | None:
+    """Return the test of an irrelevant effect in a file of its own, or None without such a file."""
+    path = f"tests/verification/test_effect_{name}.py"
+    return f"{path}::test_irrelevant_effect_changes_almost_nothing" if (ROOT / path).exists() else None
 
 
 def exists(test: str) -> None:
@@ -101,12 +108,13 @@ def steps_of(motion) -> dict:
 # The reflow: an effect is an object in the lists of `Physics`.
 
 
-@off("gravity", "surface_tension", "wall_adhesion", "inertia", "viscosity")
+@off(*(effect.name for effect in LIQUID_EFFECTS))
 def _(effect, _folder):
     """A step makes the same calls as with lists without the object and enters none of its code."""
     module, _, kind = effect.implementation.rpartition(".")
     # Wetting pins vertices by all other forces, so their lists cannot be compared.
-    others = scene.RESTING | ({"wall_adhesion": False} if effect.name in ("gravity", "surface_tension") else {})
+    is_force = not effect.of_motion and effect.name != "wall_adhesion"
+    others = scene.RESTING | ({"wall_adhesion": False} if is_force else {})
     acting, taken, left_out = (scene.flow_with(others | {effect.name: on}) for on in (True, False, False))
     taken.physics = scene.without(acting.physics, getattr(import_module(module), kind))
     for acts in (True, False):
@@ -347,9 +355,9 @@ def _(_effect, _folder):
 
 @off("mass_scaling")
 def _(_effect, _folder):
-    pieces = SimpleNamespace(roles=np.array(["copper", "solder"]), steps=np.array([1e-9, 4e-9]))
-    assert np.array_equal(mass_factor(pieces, (), 4e-9), [1.0, 1.0])
-    assert np.array_equal(mass_factor(pieces, ("copper",), 4e-9), [16.0, 1.0])
+    rank_elements = SimpleNamespace(roles=np.array(["copper", "solder"]), steps=np.array([1e-9, 4e-9]))
+    assert np.array_equal(mass_factor(rank_elements, (), 4e-9), [1.0, 1.0])
+    assert np.array_equal(mass_factor(rank_elements, ("copper",), 4e-9), [16.0, 1.0])
 
 
 @on("mass_scaling")
@@ -381,6 +389,6 @@ def _(_effect, _folder):
     before = {name: value.copy() for name, value in arrays.items()}
     limit = {"peel_stress": {"limit": 1e9, "source": "none breaks"}}
     case = read_case(CASES / "jedec_bga/case.toml", oversubscribe=True)
-    case = changed(case, "shock.failure", Failure.model_validate(limit))
+    case = with_value(case, "shock.failure", Failure.model_validate(limit))
     assert verdict_of(JudgedDrop(case, {}, arrays))["design"] == "PASS"
     assert all(np.array_equal(arrays[name], before[name]) for name in arrays)

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from pydantic import TypeAdapter
 from scipy.spatial import cKDTree
 
-from reflowshock.fem.division.fitted import fitted, fitted_to
+from reflowshock.fem.division.fitted import fit_to_mesh, fitted
 from reflowshock.fem.division.neighbours import with_neighbours
 from reflowshock.fem.elements.element import element_geometry
 from reflowshock.fem.errors import LoadError
@@ -110,7 +110,7 @@ def test_gauges_and_masses_keep_the_node_numbers_of_the_whole_mesh():
     fittings = TypeAdapter(Fittings).validate_python(
         {"watch": {"a": {"at": [2e-3, 2e-3, 0.0]}}, "gauges": {"g": {"at": [1e-3, 1e-3], "face": "upper"}}}
     )
-    table = fitted_to(mesh, upper, fittings, False)
+    table = fit_to_mesh(mesh, upper, fittings, False)
     assert mesh.points[table.points.nodes[0]] == pytest.approx([2e-3, 2e-3, 0.0])
     assert upper[table.points.cells].all()
     assert mesh.points[table.points.gauges.nodes][:, 2].max() == 0.0

@@ -120,9 +120,7 @@ def test_energy_of_a_board_balances_at_any_step():
     assert total_energy(damped) < damped.external_work
 
 
-@pytest.mark.parametrize(
-    ("step", "alpha", "message"), [(0.0, 0.0, "must be > 0"), (1e-6, 0.1, "allowed: -1/3 to 0")]
-)
+@pytest.mark.parametrize(("step", "alpha", "message"), [(0.0, 0.0, "must be > 0"), (1e-6, 0.1, "allowed: -1/3 to 0")])
 def test_numbers_out_of_range(spring, step, alpha, message):
     with pytest.raises(ValueError, match=message):
         implicit(spring[0], step, alpha)

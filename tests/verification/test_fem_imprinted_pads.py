@@ -24,6 +24,7 @@ def imprinted():
     return measures(IMPRINTED)
 
 
+@pytest.mark.long
 def test_boxes_shifted_by_half_an_element_change_little(imprinted):
     shifted = measures(replace(IMPRINTED, shift=0.5))
     assert shifted == pytest.approx(imprinted, rel=0.02)
@@ -34,6 +35,7 @@ def test_rotated_motion_changes_little():
     assert turned == pytest.approx(along, rel=0.005)
 
 
+@pytest.mark.long
 def test_elements_two_thirds_as_long_change_little(imprinted):
     problem = Problem(half_of(patch(IMPRINTED.times(2.0 / 3.0))[0]), False)
     finer = dict(ends(problem, problem.solve()))["board"]
@@ -42,6 +44,7 @@ def test_elements_two_thirds_as_long_change_little(imprinted):
     )
 
 
+@pytest.mark.long
 def test_free_form_joint_in_its_column_has_the_measures_of_a_swept_joint(imprinted):
     free_form = replace(IMPRINTED, joint=CHEAPEST | {"layers": 7}, swept=False)
     assert measures(free_form) == pytest.approx(imprinted, rel=0.03)

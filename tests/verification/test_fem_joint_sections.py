@@ -6,12 +6,12 @@ from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.bodies import motion_of
 from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
-from reflowshock.fem.division.tables import joined, model_inputs
+from reflowshock.fem.division.tables import join_meshes, model_inputs
 from reflowshock.fem.elements.stress import von_mises
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.loads.load import BodyAcceleration, NodalForces
 from reflowshock.fem.loads.pulse import Constant
-from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, make_body, make_rank_elements
 from reflowshock.fem.output.watch_joints import JointWatch
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.materials.library import SAC405
@@ -45,11 +45,11 @@ def column(held: bool, copper: bool, edges: int = 3, levels=LEVELS, bulge: float
 
 def watched(mesh, solder, response=ELASTICALLY, formulation="incompatible_modes", layer=25e-6):
     """Return body, watch and critical step of a mesh on one rank."""
-    item = model_inputs(joined(mesh), "dns", layer=layer)["dns"]
+    item = model_inputs(join_meshes(mesh), "dns", layer=layer)["dns"]
     materials = Materials(solder=solder)
-    pieces = make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials, formulation)
-    body = make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)), response)
-    return body, JointWatch(item.tables, body, solder.plasticity is not None), pieces.steps.min()
+    rank_elements = make_rank_elements(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials, formulation)
+    body = make_body(MPI.COMM_SELF, rank_elements, item.tables, np.ones(len(rank_elements.steps)), response)
+    return body, JointWatch(item.tables, body, solder.plasticity is not None), rank_elements.steps.min()
 
 
 def row_of(watch, motion):

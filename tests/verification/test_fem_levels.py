@@ -8,10 +8,10 @@ import scipy.linalg
 from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.bodies import motion_of
-from reflowshock.cases.hard.trials.coupled import Coupled, Models, pieces_of
+from reflowshock.cases.hard.trials.coupled import Coupled, Models, rank_elements_of
 from reflowshock.fem.coupling.scheme import scheme_of
 from reflowshock.fem.division.division import Division
-from reflowshock.fem.division.tables import joined, model_inputs
+from reflowshock.fem.division.tables import join_meshes, model_inputs
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.mesh.tie import net_load
@@ -90,8 +90,8 @@ def test_models_split_at_a_level_move_as_one(ratios):
     level[whole.body.local.cell_numbers] = whole.level
     plan = WindowPlan(whole.window, int(np.prod(ratios)), 200, 1)
     division = Division("local_steps", level == 0, level > 0, level, ratios, plan)
-    inputs = model_inputs(joined(MESH), division)
-    models = Models({role: pieces_of(item, ELASTIC) for role, item in inputs.items()}, division)
+    inputs = model_inputs(join_meshes(MESH), division)
+    models = Models({role: rank_elements_of(item, ELASTIC) for role, item in inputs.items()}, division)
     pair = Coupled(models.bodies(), plan, scheme_of("local_steps"))
     alone = motion_of(whole.body, whole.window)
     for motion in (alone, pair.macro.motion, pair.meso.motion):

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 
 from reflowshock.cases.hard.trials.bodies import motion_of
-from reflowshock.cases.hard.trials.coupled import Coupled, Models, models_of, pieces_of, surveyed
+from reflowshock.cases.hard.trials.coupled import Coupled, Models, models_of, rank_elements_of, surveyed
 from reflowshock.cases.hard.trials.pairs import FRACTION, Pair
 from reflowshock.fem.coupling.held_velocity import HeldVelocity
 from reflowshock.fem.coupling.one_way import OneWay
 from reflowshock.fem.division.tables import Tables, model_inputs
 from reflowshock.fem.dynamics.energy_balance import EnergyBalance, energy_sums
 from reflowshock.fem.loads.load import half_sine_drop
-from reflowshock.fem.model.assembly import Pieces
+from reflowshock.fem.model.assembly import RankElements
 from reflowshock.fem.problem.shock import Coupling
 from reflowshock.materials.library import SAC405
 from reflowshock.materials.roles import Materials
@@ -23,13 +23,13 @@ SOLDER = Materials(solder=SAC405.elastic)
 FINE, COARSE = Pair(ratio=2, height=4), Pair(ratio=1, height=2)  # the same block
 
 
-def driver_of(models: Models) -> tuple[Pieces, Tables]:
+def driver_of(models: Models) -> tuple[RankElements, Tables]:
     """Return a board with the coarse block that drives the interface of the fine model."""
     whole, _, _ = surveyed(COARSE.mesh(), SOLDER)
-    pieces, tables = pieces_of(model_inputs(whole, "dns")["dns"], SOLDER)
+    rank_elements, tables = rank_elements_of(model_inputs(whole, "dns")["dns"], SOLDER)
     fine, meso = models.parts["meso"]
-    interface = nearest(pieces.local.points, fine.local.points[fine.local.locate(meso.interface)])
-    return pieces, replace(tables, interface=pieces.local.nodes[interface].astype(np.int32))
+    interface = nearest(rank_elements.local.points, fine.local.points[fine.local.locate(meso.interface)])
+    return rank_elements, replace(tables, interface=rank_elements.local.nodes[interface].astype(np.int32))
 
 
 def nearest(points: np.ndarray, targets: np.ndarray) -> np.ndarray:

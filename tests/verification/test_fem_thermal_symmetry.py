@@ -34,9 +34,10 @@ def solved(folder: Path, symmetry: str, copper: dict, thermal: Thermal) -> tuple
     return pads, structure.solve(473.15, -5e-5, wrenches, np.zeros(len(structure.rigid_modes.names)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("copper", "thermal"),
-    [({}, Thermal()), pytest.param(PLATE, MOVED, marks=pytest.mark.long)],
+    [({}, Thermal()), (PLATE, MOVED)],
     ids=["floating", "moved, plates"],
 )
 def test_quarter_model_equals_full_model(tmp_path, copper, thermal):

@@ -5,7 +5,7 @@ import pytest
 import ufl
 from mpi4py import MPI
 
-from reflowshock.cases.hard.trials.bodies import dns_pieces, force_of, motion_of, nonlinear
+from reflowshock.cases.hard.trials.bodies import dns_elements, force_of, motion_of, nonlinear
 from reflowshock.cases.hard.trials.boxes import KINDS, box, elements_of, stiffness_matrix
 from reflowshock.cases.hard.trials.grids import mesh_of
 from reflowshock.cases.hard.trials.motion import random_start
@@ -141,10 +141,12 @@ def energy_errors(law: Law, fraction: float) -> tuple[float, float]:
 
 def body_of(elements: Elements, law: Law, part: str = "board") -> tuple[Body, float]:
     """Return a body with a material law and its smallest critical step [s]."""
-    pieces, tables = dns_pieces(mesh_of(elements.points, elements.cells, "board", {}), {"board": RUBBER})
-    pieces = pieces.with_laws(tables.part_names, {part: law})
-    step = float(pieces.steps.min())
-    return make_body(MPI.COMM_SELF, pieces, tables, np.ones(len(pieces.steps)), ForceOptions("small", step)), step
+    rank_elements, tables = dns_elements(mesh_of(elements.points, elements.cells, "board", {}), {"board": RUBBER})
+    rank_elements = rank_elements.with_laws(tables.part_names, {part: law})
+    step = float(rank_elements.steps.min())
+    return make_body(
+        MPI.COMM_SELF, rank_elements, tables, np.ones(len(rank_elements.steps)), ForceOptions("small", step)
+    ), step
 
 
 def test_free_vibration_keeps_its_energy():

@@ -17,7 +17,7 @@ from reflowshock.meshing.core.hexahedra import quad_areas, shortest_lengths
 from reflowshock.meshing.joint.free_form import free_form_solder
 from reflowshock.meshing.joint.solder import Solder
 from reflowshock.meshing.joint.swept import swept_solder
-from reflowshock.meshing.joint.tetrahedra import fill_apart
+from reflowshock.meshing.joint.tetrahedra import fill_in_process
 
 SOLDER = LIBRARY["SAC405"]
 COLUMN = barrel(0.45 * MM, 0.03 * MM)
@@ -61,10 +61,11 @@ def swept(core: int, rings: int, layers: int) -> Answer:
 @pytest.fixture(scope="module")
 def answers() -> dict[str, Answer]:
     """Return answers at the intended resolution, swept and split, and with fine swept hexahedra."""
-    split = free_form_solder(COLUMN, fill_apart(COLUMN, 0.16 * MM, False), np.asarray)
+    split = free_form_solder(COLUMN, fill_in_process(COLUMN, 0.16 * MM, False), np.asarray)
     return {"split": answer(split), "swept": swept(2, 1, 6), "exact": swept(4, 2, 14)}
 
 
+@pytest.mark.long
 def test_split_column_has_the_stiffness_and_frequency_of_fine_hexahedra(answers):
     split, exact = answers["split"], answers["exact"]
     assert split.deflection == pytest.approx(exact.deflection, rel=0.02)

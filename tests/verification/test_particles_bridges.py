@@ -50,6 +50,7 @@ def test_two_liquid_bridges_on_uniform_plates_become_one_cylinder():
     check_energy_falls(np.array([record.energy for record in drop.records]))
 
 
+@pytest.mark.long
 def test_two_overfilled_joints_become_one_body_on_four_pads():
     geometry = JointGeometry(0.31 * MM, 0.24 * MM, 0.24 * MM)
     solder = Solder(volume=0.26 * MM**3, numerics=SolderNumerics(spacing=0.1 * MM))

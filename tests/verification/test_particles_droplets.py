@@ -91,6 +91,7 @@ def struck(weber, reynolds, across, units, **angles):
     return solve_droplet(scene.model_copy(update={"duration": units * scene.unit_of_time}))
 
 
+@pytest.mark.long
 def test_spread_at_weber_30_equals_volume_of_fluid_codes():
     """The reference is interFoam with 2.428 D (``benchmarks/droplet_peers.py``); correlations give 1.94 to 2.24 D."""
     result = struck(30.0, 500.0, 10, 1.9)
@@ -98,6 +99,7 @@ def test_spread_at_weber_30_equals_volume_of_fluid_codes():
     assert abs(value(result, "volume_drift")) < 0.01
 
 
+@pytest.mark.long
 def test_a_contact_line_that_advances_has_its_advancing_angle():
     """InterFoam gives 2.104 D at 120 degrees; if the wall only pins lines at rest, the advancing angle costs 1 %."""
     settings = {"contact_angle": 120.0}, {"contact_angle": 90.0, "advancing_angle": 120.0}
@@ -126,6 +128,7 @@ def test_a_film_thinner_than_its_particles_spreads_on_and_keeps_them():
     assert (np.maximum.accumulate(total[::-1])[::-1] - total).max() < 0.01 * total[0]
 
 
+@pytest.mark.long
 def test_an_impact_whose_satellites_are_too_small_for_particles_runs_on():
     """At We 1000 and Re 5000 the run failed after 0.8 to 1.1 D / U."""
     result = struck(1000.0, 5000.0, 8, 2.5)
@@ -202,6 +205,7 @@ def test_effects_that_are_off_do_nothing():
     assert np.abs(without.rates[1:4]).max() < 1e-9 * np.abs(simulation.rates[1:4]).max()
 
 
+@pytest.mark.long
 def test_small_weight_changes_little():
     heights = [
         value(solve_droplet(ink(8, 40e-6, contact_angle=1.2, effects={"gravity": switch})), "height_over_diameter")

@@ -64,7 +64,8 @@ def test_drops_that_become_one_keep_their_momentum():
     assert body.volumes @ body.velocity == pytest.approx(0.5 * body.volumes.sum() * np.array([0.3, 0.0, 0.1]))
 
 
-@pytest.mark.parametrize("radii", [pytest.param((0.5e-3, 0.5e-3), marks=pytest.mark.long), (0.5e-3, 0.35e-3)])
+@pytest.mark.long
+@pytest.mark.parametrize("radii", [(0.5e-3, 0.5e-3), (0.5e-3, 0.35e-3)])
 def test_two_free_drops_become_one_sphere(radii):
     solder = solder_of(1e-4)
     flows = touching_balls(radii, solder)
@@ -82,6 +83,7 @@ def test_two_free_drops_become_one_sphere(radii):
     assert np.linalg.norm(surface - centre(body), axis=1) == pytest.approx(exact, rel=1e-2)
 
 
+@pytest.mark.long
 def test_two_drops_that_spread_into_each_other_become_one_cap():
     edge = np.cbrt(0.5e-9)
     solder = solder_of(1e-4)

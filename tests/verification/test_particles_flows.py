@@ -135,6 +135,7 @@ def test_a_tank_rests_under_its_weight():
     assert motion.max() < 1e-3
 
 
+@pytest.mark.long
 def test_density_diffusion_removes_pressure_noise():
     smooth, rough = (tank(diffusion, 0.0)[0].std() for diffusion in (0.1, 0.0))
     assert smooth < rough / 5.0
@@ -146,6 +147,7 @@ def dam_break(across, duration):
     return solve_dam_break(DamBreak(**parameters, duration=duration * sqrt(0.6 / 9.81), numerics=numerics))
 
 
+@pytest.mark.long
 def test_a_dam_break_strikes_the_wall_as_measured():
     """At coarse resolution the front is thinner than the smoothing length and is detected late."""
     result = dam_break(20, 5.1)

@@ -63,6 +63,7 @@ def second_mode_errors(shells, decay_rate):
     return errors
 
 
+@pytest.mark.long
 def test_second_mode_converges_in_space():
     """The order is two; the next test and the half drop on a wall check Reid's period within 0.5 %."""
     second_mode_errors(np.array([2, 3]), 0.05)
@@ -129,6 +130,7 @@ def test_laplace_drop():
     assert result.metrics["volume_drift"][0] < 1e-6
 
 
+@pytest.mark.long
 def test_a_drop_stretched_to_more_than_half_its_radius():
     """Energy decreases and momentum and volume are conserved through remeshing of tetrahedra; the period is longer."""
     result = solve_free_drop(drop(1.37e-3, 3), amplitude=0.5, periods=1.0)

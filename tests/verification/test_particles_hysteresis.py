@@ -11,7 +11,7 @@ from reflowshock.particles.parameters.scenes import Drop
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
 from reflowshock.particles.scenes.drop_at_rest import drop_to_rest, flow_to_rest
 from reflowshock.particles.scenes.flow_setup import start_flow, stop_rule
-from reflowshock.particles.scenes.metrics import ledger
+from reflowshock.particles.scenes.metrics import energy_metrics
 from reflowshock.particles.steps.rest import run_to_rest
 from reflowshock.particles.surface.contact_line import PINNED
 from reflowshock.particles.surface.hysteresis import FrictionLine, HystereticLine
@@ -48,6 +48,7 @@ def to_volume(flow, solder, volume):
     return radius, height, 2.0 * np.degrees(np.arctan(height / radius))
 
 
+@pytest.mark.long
 def test_a_drop_that_is_filled_and_emptied(flow):
     liquid, solder = flow
     radius, _, angle = to_volume(liquid, solder, 1.4 * VOLUME)
@@ -89,7 +90,7 @@ def release(half_sphere, receding, advancing, viscosity):
     before = ring_area(points, cloud.rings[0])
     assert run_to_rest(flow, stop_rule(cloud, solder, EFFECTS)).at_rest
     area = ring_area(flow.body.points, flow.body.cloud.rings[0])
-    radius, losses = np.sqrt(area / np.pi), {name: value for name, (value, _) in ledger([flow]).items()}
+    radius, losses = np.sqrt(area / np.pi), {name: value for name, (value, _) in energy_metrics([flow]).items()}
     friction = 0.5 * solder.surface_tension * (np.cos(np.radians(receding)) - np.cos(np.radians(advancing)))
     rubbed = friction * abs(area - before) / flow.solver.first_energy
     assert flow.body.volume()[0] == pytest.approx(VOLUME, rel=1e-12)
@@ -117,6 +118,7 @@ def test_oscillating_contact_line_stops_between_its_angles(half_sphere):
     assert angle == pytest.approx(105.1, abs=1.0)  # 105.1 at 9 per edge, 105.2 at 7 with a quarter of the step
 
 
+@pytest.mark.long
 def test_a_cube_comes_to_rest_between_both_angles():
     drop = Drop(volume=VOLUME, receding_angle=RECEDING, advancing_angle=ADVANCING, particles_per_edge=COUNT)
     metrics = {name: value for name, (value, _) in drop_to_rest(drop, moving(0.227)).shape.metrics.items()}

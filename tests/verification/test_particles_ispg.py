@@ -28,10 +28,9 @@ PAPER = {"surface_tension": 4.985, "viscosity": 0.227}
 STEPS_PER_PERIOD = round(1.0 / LONGEST_OF_SWING)
 
 
-LONG = [
-    pytest.param(*row, marks=pytest.mark.long)
-    for row in ((5, 15.0), (5, 120.0), (6, 60.0), (7, 30.0), (7, 60.0), (7, 148.0), (11, 60.0), (11, 120.0))
-]
+CUBES = (
+    (5, 15.0), (5, 60.0), (5, 120.0), (6, 60.0), (7, 30.0), (7, 60.0), (7, 148.0), (11, 60.0), (11, 120.0)
+)  # fmt: skip
 
 
 def cube(count, degrees, bond=0.0, symmetry="none", **wall):
@@ -64,7 +63,8 @@ def test_a_cube_without_a_wall_comes_to_rest_as_a_sphere():
     assert abs(metrics["energy_imbalance"]) < 1e-5
 
 
-@pytest.mark.parametrize(("count", "degrees"), [(5, 60.0), *LONG])
+@pytest.mark.long
+@pytest.mark.parametrize(("count", "degrees"), CUBES)
 def test_cube_oscillates_and_comes_to_rest_as_a_cap(count, degrees):
     """Published errors at 11 per edge: height 0.87 and 2.84 %, width 3.26 and 1.17 % at 60 and 120 degrees."""
     metrics, history = at_rest(count, degrees)
@@ -196,10 +196,8 @@ FRICTION = [(7, 60.0, {"wall": "slip", "slip_length": 5e-5}), (5, 120.0, {"wall"
 FINER = [(count, angle, wall) for count in (7, 11) for angle in (60.0, 120.0) for _, _, wall in FRICTION]
 
 
-@pytest.mark.parametrize(
-    ("count", "degrees", "wall"),
-    [FRICTION[1], *(pytest.param(*row, marks=pytest.mark.long) for row in FINER if row != FRICTION[1])],
-)
+@pytest.mark.long
+@pytest.mark.parametrize(("count", "degrees", "wall"), [FRICTION[1], *(row for row in FINER if row != FRICTION[1])])
 def test_walls_with_friction_do_not_change_the_rest(count, degrees, wall):
     """Such drops crept along their wall, driven by mesh smoothing."""
     metrics, _ = at_rest(count, degrees, **wall)
@@ -281,6 +279,7 @@ def test_free_drop_oscillates_with_the_exact_period():
     assert abs(gained + state.losses.total) < 0.01 * start
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("shells", [5, pytest.param(8, marks=pytest.mark.long)])
 def test_oscillation_of_real_solder_decays_at_the_default_step(shells):
     """Cases: 561 and 2057 particles, 0.1 R; with predicted tension and BDF2, 16 steps per period left 2057 undamped."""

@@ -35,6 +35,7 @@ def neck_radius(body):
     return np.sqrt(section_areas(points, body.triangles, heights).min() / np.pi)
 
 
+@pytest.mark.long
 def test_the_neck_of_two_drops_grows_with_the_root_of_time():
     """Solder balls with R of 6 spacings follow r = C (gamma R / rho)^(1/4) (t + t0)^(1/2), t0 from the first neck.
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from reflowshock.particles.core.neighbours import NeighbourList
-from reflowshock.particles.gripc.moving_least_squares import SUPPORT, derivatives
+from reflowshock.particles.gripc.moving_least_squares import SUPPORT, fit_derivatives
 
 COUNTS = (8, 12, 18)
 
@@ -17,7 +17,7 @@ def relative_errors(basis, count, seed=13):
     inner = np.flatnonzero((np.abs(points - 0.5) < 0.25).all(axis=1)).astype(np.int32)
     neighbours = NeighbourList(SUPPORT[basis] * spacing, 0.0)
     neighbours.update(points)
-    values = derivatives(points, inner, neighbours, basis)
+    values = fit_derivatives(points, inner, neighbours, basis)
     x, y, z = points.T
     field = np.sin(2 * x) * np.cos(y) * np.exp(z)
     slope = (2 * np.cos(2 * x) * np.cos(y) * np.exp(z))[inner]
@@ -53,6 +53,6 @@ def test_derivatives_of_a_constant_vanish(basis):
     points = np.random.default_rng(14).uniform(size=(400, 3))
     neighbours = NeighbourList(0.45, 0.0)
     neighbours.update(points)
-    values = derivatives(points, np.arange(400, dtype=np.int32), neighbours, basis)
+    values = fit_derivatives(points, np.arange(400, dtype=np.int32), neighbours, basis)
     for matrix in (*values.gradient, values.laplacian):
         assert np.abs(matrix @ np.ones(400)).max() < 1e-6 * abs(matrix).max()

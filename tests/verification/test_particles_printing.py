@@ -8,7 +8,7 @@ from reflowshock.particles.flows.droplet import cap
 from reflowshock.particles.flows.printing import Printing, PrintingNumerics
 from reflowshock.particles.printing.deposit import SOLID, CuredBody, Deposit
 from reflowshock.particles.sph import flow
-from reflowshock.particles.surface.level_set import depths
+from reflowshock.particles.surface.level_set import measure_depths
 
 LAYERS = 5
 
@@ -25,7 +25,7 @@ def on_slab(degrees):
     across, up = spacing * (np.arange(-half, half) + 0.5), spacing * (np.arange(LAYERS) + 0.5)
     points = np.stack(np.meshgrid(across, across, up, indexing="ij")).reshape(3, -1)
     count, top = points.shape[1], LAYERS * spacing
-    deposit.fields = flow.liquid_and_walls(points, np.empty((3, 0)), np.zeros(count), deposit.law)
+    deposit.fields = flow.make_fields(points, np.empty((3, 0)), np.zeros(count), deposit.law)
     deposit.state, deposit.drop = np.full(count, SOLID, np.int32), np.zeros(count, np.int32)
     deposit.dose = np.zeros(count)
     deposit._add_body(CuredBody(*open_box(half * spacing, top), 0))
@@ -60,6 +60,7 @@ def errors_on_slab(degrees, units):
     return points[:, 2].max() / height - 1.0, (radius - exact).mean() / half
 
 
+@pytest.mark.long
 def test_a_drop_on_cured_ink_has_the_contact_angle_of_one_on_the_plate():
     height, profile = errors_on_slab(90.0, 1.5)
     assert abs(height) < 0.05 and abs(profile) < 0.05  # as on the plate; 0.18 and 0.2 without wall fractions
@@ -70,7 +71,7 @@ def test_liquid_that_spreads_on_cured_ink_stays_within_its_surface():
     while deposit.time < 0.5 * np.sqrt(scene.density * scene.length**3 / scene.surface_tension):
         deposit.step(1.0)
     deposit.update()
-    inside = depths(deposit.points[deposit.liquid], deposit.surface.points, deposit.surface.triangles)
+    inside = measure_depths(deposit.points[deposit.liquid], deposit.surface.points, deposit.surface.triangles)
     assert inside.min() > -0.2 * deposit.law.spacing  # before the surface had an image in cured ink: -0.7
 
 

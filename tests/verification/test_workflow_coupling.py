@@ -12,7 +12,7 @@ from reflowshock.particles.reference.young_laplace import joint_meridian
 from reflowshock.particles.scenes.carried_joint import stiffness_estimate
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.reflow.coupling import Coupling, NotInBalance, floating_height, placed, scale_of, start
+from reflowshock.workflow.reflow.coupling import Coupling, NotInBalance, floating_height, place_joints, scale_of, start
 from reflowshock.workflow.reflow.forecast import LoadStep, load_steps
 from tests.support.reflow_structures import NAMES, Bow, joints_here, rigid_modes
 from tests.support.workflow_command import SMALL_CASE
@@ -34,7 +34,7 @@ def coupled(folder, structure, steps=(300.0,), *, rigid=0.0, bends=True, fail=No
     coupling = Coupling(structure, joints, drawn, scale, bends, lambda _: None, seen.append)
     coupling.run(state, [LoadStep(temperature, 0.0) for temperature in steps])
     return SimpleNamespace(
-        state=state, joints=joints, places=placed(drawn, state.state.pad_motion), seen=seen, scale=scale
+        state=state, joints=joints, places=place_joints(drawn, state.state.pad_motion), seen=seen, scale=scale
     )
 
 
@@ -62,6 +62,7 @@ def test_rigid_package_on_joints_has_the_height_of_one_joint(tmp_path, count):
     )
 
 
+@pytest.mark.long
 def test_joints_with_inertia_carry_a_package_at_the_default_height(tmp_path):
     """With the scheme ispg each exchange ends at rest with the same height and forces that balance the weight."""
     load, gaps = 5e-5, {}
@@ -79,6 +80,7 @@ def test_joints_with_inertia_carry_a_package_at_the_default_height(tmp_path):
     assert gaps["ispg"] == pytest.approx(gaps["energy"], rel=5e-4)
 
 
+@pytest.mark.long
 def test_a_package_that_starts_tilted_and_shifted_levels_and_centres_itself(tmp_path):
     """Rigid-body modes start at 0.2 radii of shift and one degree of tilt and twist; one micrometre remains."""
     structure = Bow(SQUARE, rigid_modes(SQUARE, NAMES, 8e-5))
@@ -89,6 +91,7 @@ def test_a_package_that_starts_tilted_and_shifted_levels_and_centres_itself(tmp_
     assert reflow.state.rigid[2] + GAP == pytest.approx(exact_height(2e-5), rel=5e-3)
 
 
+@pytest.mark.long
 def test_weight_off_the_centre_tilts_the_package_towards_it(tmp_path):
     """Moments balance about both axes; the axial joint stiffness predicts the tilt to some per cent."""
     weight, at = 4e-4, (0.3e-3, 0.1e-3)

@@ -32,8 +32,8 @@ from reflowshock.workflow.jobs import batch
 from reflowshock.workflow.kinds import kind_of, stage_seconds
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.process.environment import available_cores
-from reflowshock.workflow.process.terminal import progress_bar, styled, text_table
-from reflowshock.workflow.store.folders import check_folder, locked
+from reflowshock.workflow.process.terminal import progress_bar, style_text, text_table
+from reflowshock.workflow.store.folders import check_folder, lock_folder
 from reflowshock.workflow.store.keys import product_keys
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.state import failed_checks
@@ -198,13 +198,13 @@ def show(request: AccuracyRequest, out: Path | None, console: Console) -> bool:
     compute = partial(_compute, request=request, until=kind_of(case).study(case).until)
     accuracy, runner = measure(request, folder, compute)
     missing = (*_left_out(runner), *_impossible(runner), *_failed(runner))
-    remarks = (*missing, *unverified(accuracy), *_unhealthy(accuracy, runner), *_full_size(request, accuracy))
+    remarks = (*missing, *remark_unverified(accuracy), *_unhealthy(accuracy, runner), *_full_size(request, accuracy))
     write_pages(folder, accuracy, remarks)
     runs = tables.runs(accuracy)
     title = f"\nErrors and costs (smallest of repeated runs) on {accuracy.machine}"
     console.print(text_table(title, runs["head"][:-1], [row[:-1] for row in runs["rows"]]))
     for remark in (tables.legend(accuracy), *tables.remarks(accuracy)):
-        console.print(styled("[dim]{}", remark), soft_wrap=True)
+        console.print(style_text("[dim]{}", remark), soft_wrap=True)
     console.print(
         table(
             tables.orders(accuracy),
@@ -236,14 +236,14 @@ def _compute(
     request: AccuracyRequest,
 ) -> Mapping[str, str]:
     """Compute points one stage at a time, so that measurements do not disturb each other, and show the progress."""
-    again = " again, to measure their times" if store.folder.name.startswith("again") else ""
-    with progress_bar(f"{len(points)} point{'s' if len(points) > 1 else ''}{again}") as progress:
+    suffix = " again, to measure their times" if store.folder.name.startswith("again") else ""
+    with progress_bar(f"{len(points)} point{'s' if len(points) > 1 else ''}{suffix}") as progress:
 
         def count() -> None:
             progress(sum(store.is_complete(point, until) for point in points) / len(points))
 
         machine = batch.Machine(available_cores(), True, request.oversubscribe, each_second=count)
-        with locked(store.folder, CONTENT, points[0].case.case.name, request.force) as lock:
+        with lock_folder(store.folder, CONTENT, points[0].case.case.name, request.force) as lock:
             return batch.run_points(store, points, until, machine, lock)
 
 
@@ -267,7 +267,7 @@ def _failed(runner: StudyRunner) -> list[str]:
     return [f"Failed runs are not repeated unless you remove {work}."] if runner.failed else []
 
 
-def unverified(accuracy: Accuracy) -> list[str]:
+def remark_unverified(accuracy: Accuracy) -> list[str]:
     """Return a remark if the recommended settings were not run successfully."""
     chosen = accuracy.recommended
     if chosen is None or tables.prediction(accuracy) is not None:
@@ -314,9 +314,9 @@ def total(calibration: Calibration, case: Case) -> float:
 def _show_recommendation(accuracy: Accuracy, console: Console) -> None:
     chosen = accuracy.recommended
     if chosen is None:
-        console.print(styled("\n[bold]No recommendation[/]: no run within the budget has a known error."))
+        console.print(style_text("\n[bold]No recommendation[/]: no run within the budget has a known error."))
         return
-    advice = styled("\n[bold]Recommended: {}[/], {}. In the case file:\n", chosen.run.name, chosen.why)
+    advice = style_text("\n[bold]Recommended: {}[/], {}. In the case file:\n", chosen.run.name, chosen.why)
     console.print(advice, soft_wrap=True)
     for line in tables.as_lines(chosen.run.settings):
         console.print(f"    {line}")

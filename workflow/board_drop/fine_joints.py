@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from reflowshock.effect import Decision, Effect, Toggle, decision
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 from reflowshock.problem import Problem
 
 if TYPE_CHECKING:
@@ -68,11 +68,11 @@ def most_stressed(history: Path, count: int) -> FineJoints:
     """Return the critical joints of a history, ranked by peel stress, or by plastic work if the solder yields."""
     import numpy as np
 
-    from reflowshock.fem.output.ranking import ranked, ranking_measure
+    from reflowshock.fem.output.ranking import rank_joints, ranking_measure
     from reflowshock.workflow.case.text import quantity
 
     with np.load(history) as arrays:
-        names, order, measure = arrays["joints"], ranked(arrays), ranking_measure(arrays)
+        names, order, measure = arrays["joints"], rank_joints(arrays), ranking_measure(arrays)
         peak = measure.peaks(arrays)
     peaks = [f"{names[k]} {quantity({'value': float(peak[k]), 'unit': measure.unit})}" for k in order[: count + 1]]
     why = f"the most stressed of {len(names)} by {measure.name} in a run with coarse joints: {', '.join(peaks[:count])}"
@@ -99,7 +99,11 @@ def read_fine_joints(folder: Path) -> FineJoints | None:
 
 
 def problems(case: "BoardDropCase") -> Iterator[Problem]:
-    """Yield problems of unknown joints, and of more critical joints than the model has."""
+    """Yield problems of unknown joints, and of more critical joints than the model has.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     from reflowshock.meshing.board.pads import pad_table
 
     coupling, sites = case.shock.coupling, pad_table(case.package, case.board, case.warpage)
@@ -122,7 +126,7 @@ def _unknown(name: str, sites: "list[PadSite]", case: "BoardDropCase") -> Iterat
         return
     image = "" if name.upper() in names else _image(name.upper(), sites, case)
     message = "lies in a quarter that is not modelled" if image else "is not a joint of the model"
-    yield Problem(FINE, message, name, f"{names[0]} to {names[-1]}", image or nearest(name, names, alike=0.5))
+    yield Problem(FINE, message, name, f"{names[0]} to {names[-1]}", image or find_nearest(name, names, similarity=0.5))
 
 
 def _image(name: str, sites: "list[PadSite]", case: "BoardDropCase") -> str:

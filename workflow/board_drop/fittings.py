@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from reflowshock.fem.problem.attachment_checks import fitting_problems, inside
+from reflowshock.fem.problem.attachment_checks import fitting_problems, position_problems
 from reflowshock.fem.problem.fittings import BoardFittings, Neighbour, Place
 from reflowshock.fem.problem.structure import Holes, Layer, Structure
 from reflowshock.problem import Problem
@@ -62,7 +62,11 @@ def drawn_board(case: "BoardDropCase") -> DrawnBoard:
 
 
 def problems(case: "BoardDropCase") -> Iterator[Problem]:
-    """Yield problems of fittings off the board, and of supports that contradict the shock."""
+    """Yield problems of fittings off the board, and of supports that contradict the shock.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     board = drawn_board(case)
     yield from fitting_problems(case, board)
     yield from neighbour_problems(case, board)
@@ -79,7 +83,11 @@ def problems(case: "BoardDropCase") -> Iterator[Problem]:
 
 
 def neighbour_problems(case: "BoardDropCase", board: DrawnBoard) -> Iterator[Problem]:
-    """Yield problems of further packages: off the board, over a hole or over another package."""
+    """Yield problems of further packages: off the board, over a hole or over another package.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     package = case.package.substrate
     footprints = {"package": ((0.0, 0.0), (package.length, package.width))}
     for name, item in case.packages.items():
@@ -95,7 +103,7 @@ def neighbour_problems(case: "BoardDropCase", board: DrawnBoard) -> Iterator[Pro
         for x in (-0.5, 0.5):
             for y in (-0.5, 0.5):
                 corner = (item.at[0] + x * item.substrate[0], item.at[1] + y * item.substrate[1], 0.0)
-                yield from inside(f"{key}.at", corner, board)
+                yield from position_problems(f"{key}.at", corner, board)
         yield from _over_holes(f"{key}.at", item, board)
     if case.packages and case.cooled:
         message = "does not support further packages, whose residual stress is not computed"

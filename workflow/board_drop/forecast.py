@@ -128,7 +128,11 @@ def forecast_board_drop(case: BoardDropCase) -> PackageForecast:
 
 
 def step_problems(case: BoardDropCase) -> Iterator[Problem]:
-    """Yield problems of too many time steps, and of a pulse or duration shorter than a coupling window."""
+    """Yield problems of too many time steps, and of a pulse or duration shorter than a coupling window.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     import numpy as np
 
     from reflowshock.fem.estimates.estimate import damped_critical_step

@@ -48,7 +48,11 @@ class IdenticalJoints(Effect["DropScene"]):
 
 
 def problems(case: "BoardDropCase") -> Iterator[Problem]:
-    """Yield the problem of identical joints that would touch each other."""
+    """Yield the problem of identical joints that would touch each other.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     package = case.package
     if not case.shock.identical_joints or package.rows * package.columns == 1:
         return
@@ -76,6 +80,9 @@ def with_comparison(findings: Findings, run: "Run[BoardDropCase]", folder: Path,
         run: Case, and run folder with the pad table after solidification.
         folder: Folder of the shock, with a folder for the mode and a folder ``identical``.
         mode: Mode of the run with real joints, the name of its folder.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
     """
     from reflowshock.meshing.board.pads import read_pads
 

@@ -34,7 +34,7 @@ def write_surfaces(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
     from reflowshock.meshing.board.pads import read_pads
     from reflowshock.meshing.surface.closed_surface import measure, write_surface
     from reflowshock.meshing.surface.user_surface import file_volume, load_surface
-    from reflowshock.particles.scenes.orientation import Orientation, oriented
+    from reflowshock.particles.scenes.orientation import Orientation, orient
     from reflowshock.particles.scenes.products import read_shapes
 
     package, joints = run.case.package, read_json(run.folder / "reflow/joints.json")
@@ -45,7 +45,7 @@ def write_surfaces(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
     bodies = {name: shape for name, shape in shapes.items() if BETWEEN in name}
     for name, joint in flowed.items():
         if joint["verdict"] != "bridged":
-            bodies[name] = oriented(shapes[joint["shape"]], Orientation(joint["turn"], joint["mirror"]))
+            bodies[name] = orient(shapes[joint["shape"]], Orientation(joint["turn"], joint["mirror"]))
     measures: dict[str, dict] = {}
     for name, shape in bodies.items():
         closed = _closed(shape)

@@ -11,7 +11,7 @@ from reflowshock.workflow.board_drop.shock_forecast import ShockForecast
 from reflowshock.workflow.case.text import duration, short
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.process.environment import available_cores
-from reflowshock.workflow.process.terminal import REFLOW_SPEED, new_table, styled
+from reflowshock.workflow.process.terminal import REFLOW_SPEED, new_table, style_text
 
 SETTLES = "ends half a swing of the board after the largest stress of the joints"
 
@@ -24,7 +24,7 @@ def package_tables(case: PackageCase, outlook: PackageForecast) -> Iterator[Rend
         outlook: Forecast of the case.
     """
     yield f"\n{_joints(case, outlook)}"
-    yield styled("\n[dim]{}", REFLOW_SPEED)
+    yield style_text("\n[dim]{}", REFLOW_SPEED)
 
 
 def board_drop_tables(case: BoardDropCase, outlook: PackageForecast) -> Iterator[RenderableType]:
@@ -38,8 +38,10 @@ def board_drop_tables(case: BoardDropCase, outlook: PackageForecast) -> Iterator
     yield _sizes(case, outlook)
     yield _shock(case, outlook.shock)
     rate = f"{outlook.shock.updates_per_second:.1e} element updates per second and rank (fem/estimates/estimate.py)"
-    yield styled("\n[dim]Costs assume {}", rate)
-    yield styled("[dim]and the reflow speed in particles/parameters/estimate.py, both as benchmarks/ measured them.")
+    yield style_text("\n[dim]Costs assume {}", rate)
+    yield style_text(
+        "[dim]and the reflow speed in particles/parameters/estimate.py, both as benchmarks/ measured them."
+    )
 
 
 def _sizes(case: PackageCase, outlook: PackageForecast) -> Table:

@@ -15,12 +15,20 @@ from reflowshock.workflow.reflow import forecast as reflow_forecast
 
 
 def package_problems(case: PackageCase) -> list[Problem]:
-    """Return the contradictions between the parameters of package, joints and board."""
+    """Return the contradictions between the parameters of package, joints and board.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
+    """
     return _of_geometry(case) or _of_joints(case)
 
 
 def board_drop_problems(case: BoardDropCase) -> list[Problem]:
-    """Return the contradictions between the parameters of package, joints, board and shock."""
+    """Return the contradictions between the parameters of package, joints, board and shock.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
+    """
     from reflowshock.fem.problem import shock_checks
 
     if problems := _of_geometry(case):

@@ -26,7 +26,11 @@ FIRST = {"residual_two_scale": 0, "residual": 1}  # order of the folders of cool
 
 
 def problems(case: BoardDropCase) -> Iterator[Problem]:
-    """Yield problems of settings of the shock that exclude residual stress."""
+    """Yield problems of settings of the shock that exclude residual stress.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     if case.cooled and case.shock.numerics.kinematics == "corotational":
         message = "cannot be combined with thermal.effects.residual_stress = on, whose stress depends on the path"
         yield Problem("shock.numerics.kinematics", message, "corotational", "finite, auto")
@@ -94,6 +98,9 @@ def with_cooling(findings: Findings, case: BoardDropCase, folder: Path) -> Findi
         findings: Metrics, health checks and effects of the shock.
         case: Case of a board drop.
         folder: Folder of the shock; without coolings in it only the effect is added.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
     """
     paths = sorted(folder.glob(f"*residual*/{RESULT}"), key=lambda path: FIRST.get(path.parent.name, len(FIRST)))
     metrics, health = dict(findings.metrics), dict(findings.health)

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from reflowshock.effect import Decision, Effect, decided
+from reflowshock.effect import Decision, Effect, decide_all
 from reflowshock.fem.estimates.drop_effects import DROP_EFFECTS
 from reflowshock.workflow.board_drop.board_deflection import DropScene
 from reflowshock.workflow.board_drop.fine_joints import CoarseJoints
@@ -15,12 +15,12 @@ SHOCK_EFFECTS: tuple[Effect[DropScene], ...] = (*DROP_EFFECTS, *OF_JOINTS)
 
 def shock_effects(case: BoardDropCase) -> dict[str, Decision]:
     """Decide the effects of a shock."""
-    return decided(SHOCK_EFFECTS, DropScene(case))
+    return decide_all(SHOCK_EFFECTS, DropScene(case))
 
 
 def of_joint_meshes(case: BoardDropCase) -> dict[str, Decision]:
     """Decide on coarse and identical joints, the effects that add joint meshes."""
-    return decided(OF_JOINTS, DropScene(case))
+    return decide_all(OF_JOINTS, DropScene(case))
 
 
 def with_influence(effects: dict, case: BoardDropCase) -> dict[str, Any]:

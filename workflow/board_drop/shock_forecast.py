@@ -125,14 +125,19 @@ def forecast_shock(case: "BoardDropCase", parts: Parts, share: float = 1.0) -> S
     Raises:
         CaseError: The critical steps differ by more than ``shock.coupling.levels`` levels allow.
     """
-    from reflowshock.fem.estimates.estimate import UPDATES_PER_SECOND, implicit_plan, largest_implicit_step, shortened
+    from reflowshock.fem.estimates.estimate import (
+        UPDATES_PER_SECOND,
+        implicit_plan,
+        largest_implicit_step,
+        shorten_plan,
+    )
     from reflowshock.fem.estimates.solver_cost import implicit_cost, plate_nodes
 
     shock = case.shock
     two_scale = _forecast_two_scale(case, two_scale_parts(case))
     search = _forecast_two_scale(case, coarse_parts(case)).seconds if shock.coupling.fine_joints == "critical" else 0.0
     plan = _plan(case, parts)
-    dns_plan = shortened(plan, shock.numerics.dns_duration or longest_duration(case))
+    dns_plan = shorten_plan(plan, shock.numerics.dns_duration or longest_duration(case))
     dns_share = dns_plan.windows / plan.windows
     pulses = [shock.pulse_duration] if shock.pulse_duration else []
     implicit = implicit_plan(dns_plan, largest_implicit_step(longest_duration(case), pulses))
@@ -181,7 +186,11 @@ def implicit_seconds(case: "BoardDropCase") -> float | None:
 
 
 def shorter_than_window(case: "BoardDropCase") -> Iterator[Problem]:
-    """Yield the problem of a pulse, or a whole shock, that ends within the first window of the two-scale run."""
+    """Yield the problem of a pulse, or a whole shock, that ends within the first window of the two-scale run.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     from reflowshock.fem.division.decide import longest_window
 
     parts = two_scale_parts(case)

@@ -14,7 +14,15 @@ from reflowshock.workflow.process.products import read_json, write_json
 
 
 def geometry(run: Run[PackageCase], folder: Path) -> Findings:
-    """Mesh the flat board and the flat package, and write the pad table."""
+    """Mesh the flat board and the flat package, and write the pad table.
+
+    Args:
+        run: Case, cores, and run folder from which the products of earlier stages are read.
+        folder: Folder into which the products of the stage are written.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
+    """
     from reflowshock.meshing.board.assembly import write_assembly
     from reflowshock.meshing.board.pads import pad_table, write_pads
     from reflowshock.meshing.board.parameters import Warpage
@@ -29,7 +37,15 @@ def geometry(run: Run[PackageCase], folder: Path) -> Findings:
 
 
 def surface(run: Run[PackageCase], folder: Path) -> Findings:
-    """Close the surface of each joint, or read the user's surface, and measure it."""
+    """Close the surface of each joint, or read the user's surface, and measure it.
+
+    Args:
+        run: Case, cores, and run folder from which the products of earlier stages are read.
+        folder: Folder into which the products of the stage are written.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
+    """
     from reflowshock.workflow.board_drop.joint_meshes import write_surfaces
 
     surfaces = write_surfaces(run, folder)
@@ -38,14 +54,30 @@ def surface(run: Run[PackageCase], folder: Path) -> Findings:
 
 
 def solder_mesh(run: Run[PackageCase], folder: Path) -> Findings:
-    """Place the package at its position after solidification and mesh every joint."""
+    """Place the package at its position after solidification and mesh every joint.
+
+    Args:
+        run: Case, cores, and run folder from which the products of earlier stages are read.
+        folder: Folder into which the products of the stage are written.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
+    """
     from reflowshock.workflow.board_drop.joint_meshes import mesh_real_joints
 
     return findings.of_solder_mesh(mesh_real_joints(run.case, run.folder, folder, coarse=False), {})
 
 
 def solder_mesh_for_drop(run: Run[BoardDropCase], folder: Path) -> Findings:
-    """Mesh every joint, and the coarse and identical joints that the shock needs."""
+    """Mesh every joint, and the coarse and identical joints that the shock needs.
+
+    Args:
+        run: Case, cores, and run folder from which the products of earlier stages are read.
+        folder: Folder into which the products of the stage are written.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
+    """
     from reflowshock.workflow.board_drop.fine_joints import needs_coarse_joints
     from reflowshock.workflow.board_drop.joint_meshes import mesh_identical_joints, mesh_real_joints
     from reflowshock.workflow.board_drop.shock_effects import of_joint_meshes
@@ -59,7 +91,15 @@ def solder_mesh_for_drop(run: Run[BoardDropCase], folder: Path) -> Findings:
 
 
 def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
-    """Run the shock in each mode, one MPI run of ``fem`` each; compare modes, and real with identical joints."""
+    """Run the shock in each mode, one MPI run of ``fem`` each; compare modes, and real with identical joints.
+
+    Args:
+        run: Case, cores, and run folder from which the products of earlier stages are read.
+        folder: Folder into which the products of the stage are written.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
+    """
     from reflowshock.workflow.board_drop.shock_cooling import with_cooling
     from reflowshock.workflow.board_drop.shock_effects import with_influence
     from reflowshock.workflow.board_drop.shock_launch import find_fine_joints, read_results, run_mode

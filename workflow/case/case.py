@@ -22,10 +22,10 @@ class Case(Parameters):
     """Everything that a run depends on, in SI floats.
 
     Attributes:
-        kind: name of the table that identifies a case file of this kind.
-        stages: pipeline of all cases of this kind.
-        ranks_key: dotted key of ``ranks``.
-        case: name and title.
+        kind: Name of the table that identifies a case file of this kind.
+        stages: Pipeline of all cases of this kind.
+        ranks_key: Dotted key of ``ranks``.
+        case: Name and title.
         scale: "full", or the name of a table in ``[scales]`` whose values replace values of the file.
     """
 

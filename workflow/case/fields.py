@@ -27,6 +27,9 @@ def quantity_of(field: FieldInfo) -> Quantity | None:
     return next((item for item in _metadata(field) if isinstance(item, Quantity)), None)
 
 
+TAG_KEYS = ("kind", "method")  # keys whose value selects the model of a table
+
+
 def holds_named_tables(field: FieldInfo) -> bool:
     """Return whether a field is a table of tables with user-defined names, such as the layers of a structure."""
     return typing.get_origin(field.annotation) is dict
@@ -41,17 +44,23 @@ def models_of(field: FieldInfo) -> tuple[type[BaseModel], ...]:
 
 
 def model_of(field: FieldInfo, table: dict) -> type[BaseModel] | None:
-    """Return the model of a table; if a field has several models, the one with the ``kind`` of the table."""
+    """Return the model of a table; if a field has several models, the one with the tag of the table."""
     models = models_of(field)
     if len(models) < 2:
         return models[0] if models else None
-    kind = table.get("kind", getattr(field.default, "kind", None))
-    return next((model for model in models if tag_of(model) == kind), None)
+    key = tag_key(models[0])
+    tag = table.get(key, getattr(field.default, key, None))
+    return next((model for model in models if tag_of(model) == tag), None)
+
+
+def tag_key(model: type[BaseModel]) -> str:
+    """Return the key that identifies a model among the models of a table: ``kind`` or ``method``."""
+    return next(key for key in TAG_KEYS if key in model.model_fields)
 
 
 def tag_of(model: type[BaseModel]) -> str:
-    """Return the ``kind`` that identifies a model among the models of a table."""
-    return str(typing.get_args(model.model_fields["kind"].annotation)[0])
+    """Return the tag that identifies a model among the models of a table."""
+    return str(typing.get_args(model.model_fields[tag_key(model)].annotation)[0])
 
 
 def alternatives(field: FieldInfo) -> tuple[FieldInfo, ...]:
@@ -101,10 +110,10 @@ def to_si_table(model: type[BaseModel], table: dict, prefix: str, problems: list
     """Convert a table of a case file to SI floats, field by field.
 
     Args:
-        model: model of the table; unknown keys stay, so that its validation rejects them.
-        table: the table as TOML gives it.
-        prefix: dotted key of the table with its dot, or empty.
-        problems: list to which unit errors are added; their values become nan.
+        model: Model of the table; unknown keys stay, so that its validation rejects them.
+        table: The table as TOML gives it.
+        prefix: Dotted key of the table with its dot, or empty.
+        problems: List to which unit errors are added; their values become nan.
 
     Returns:
         The table in SI values. Tables of the same kind as their default are completed by it.
@@ -147,12 +156,12 @@ def _of_table(field: FieldInfo, value: object, key: str, problems: list[Problem]
         if model is None:
             return value
         default_values = field.default.model_dump() if isinstance(field.default, model) else {}
-        # Model defaults except ``kind`` are left out, so that ``model_fields_set`` holds the keys of the case.
+        # Model defaults except tags are left out, so that ``model_fields_set`` holds the keys of the case.
         model_fields = model.model_fields
         defaults = {
             name: default
             for name, default in default_values.items()
-            if name == "kind" or default != model_fields[name].default
+            if name in TAG_KEYS or default != model_fields[name].default
         }
         return defaults | to_si_table(model, value, key + ".", problems)
     return value

@@ -29,6 +29,9 @@ def too_many_steps(key: str, duration: float, step: float, solver: str) -> Itera
         duration: Duration of the motion [s].
         step: Predicted time step [s].
         solver: Name of the solver.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
     """
     if not step > 0.0:
         message = f"has no {solver} time step: sizes, densities, moduli or damping are out of range"

@@ -66,15 +66,23 @@ NAMED_NUMBERS = {
 }
 
 
-def implausible(case: Case) -> Iterator[Problem]:
-    """Yield a problem for each parameter with an implausible value."""
+def find_implausible(case: Case) -> Iterator[Problem]:
+    """Yield a problem for each parameter with an implausible value.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     for key, value, field in fields.leaves(case):
         for number in _numbers(value):
             yield from _implausible(key, number, field)
 
 
 def implausible_tables(case: Case) -> Iterator[Problem]:
-    """Yield a problem for each pulse table with an implausible duration or value."""
+    """Yield a problem for each pulse table with an implausible duration or value.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     for key, unit, number in largest_values(case.pulse_tables):
         plausible = BY_DIMENSION[dimension(unit)]
         if number > to_si(plausible.high, unit):

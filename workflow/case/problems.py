@@ -16,8 +16,8 @@ class Origin:
     """Origin of a value that does not stand under its own key in the file.
 
     Attributes:
-        label: name of an option or of a table of the file.
-        key: key of the value in the file; empty for options.
+        label: Name of an option or of a table of the file.
+        key: Key of the value in the file; empty for options.
     """
 
     label: str
@@ -62,7 +62,7 @@ class CaseError(ValueError):
         """Return the same error with line and column of each key in the file.
 
         Args:
-            places: function from a dotted key to its position in the file.
+            places: Function from a dotted key to its position in the file.
         """
         return CaseError(self.source, [self._located(problem, places) for problem in self.problems], self.origins)
 

@@ -12,7 +12,10 @@ def unreadable_pulses(tables: Tables) -> Iterator[Problem]:
     """Yield a problem for each table that cannot be read.
 
     Args:
-        tables: file, quantity and column title (None for single columns), by key.
+        tables: File, quantity and column title (None for single columns), by key.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
     """
     from reflowshock.fem.errors import PulseError
     from reflowshock.fem.loads.pulse_table import read_pulse

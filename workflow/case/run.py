@@ -15,10 +15,10 @@ class Run(Generic[AnyCase]):
     """Input of a stage.
 
     Attributes:
-        folder: the run folder, with the products of earlier stages.
-        case: the resolved case.
-        cores: number of cores that a stage may use.
-        oversubscribe: whether MPI may have more ranks than cores.
+        folder: The run folder, with the products of earlier stages.
+        case: The resolved case.
+        cores: Number of cores that a stage may use.
+        oversubscribe: Whether MPI may have more ranks than cores.
     """
 
     folder: Path
@@ -36,10 +36,10 @@ class Findings:
     """Results of a stage, in the form of ``summary.json``.
 
     Attributes:
-        metrics: name -> {"value", "unit"}.
-        health: check -> {"value", "limit", "ok"}.
-        effects: effect -> {"on", "why"}.
-        continued: names of parts that continued from checkpoints, or empty.
+        metrics: Name -> {"value", "unit"}.
+        health: Check -> {"value", "limit", "ok"}.
+        effects: Effect -> {"on", "why"}.
+        continued: Names of parts that continued from checkpoints, or empty.
     """
 
     metrics: dict = field(default_factory=dict)

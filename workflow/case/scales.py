@@ -8,7 +8,7 @@ scale = "full"                                   # or --set scale="quick"
 import tomllib
 from collections.abc import Iterator
 
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 from reflowshock.problem import Problem, as_toml
 from reflowshock.workflow.case.case import FULL
 from reflowshock.workflow.case.names import is_name, wrong_name
@@ -21,8 +21,8 @@ def take_scales(table: dict, problems: list[Problem]) -> dict[str, dict[str, obj
     """Remove the scales from the table of a case file and return them.
 
     Args:
-        table: contents of the file; ``scales`` is removed.
-        problems: list to which errors are added.
+        table: Contents of the file; ``scales`` is removed.
+        problems: List to which errors are added.
 
     Returns:
         Values by dotted key, by name of the scale.
@@ -61,7 +61,9 @@ def choose(name: object, scales: dict[str, dict[str, object]], problems: list[Pr
     if isinstance(name, str) and (name == FULL or name in scales):
         return scales.get(name, {})
     names = [FULL, *scales]
-    problems.append(Problem("scale", "unknown scale", name, "one of " + ", ".join(names), nearest(str(name), names)))
+    problems.append(
+        Problem("scale", "unknown scale", name, "one of " + ", ".join(names), find_nearest(str(name), names))
+    )
     return {}
 
 

@@ -14,14 +14,14 @@ class Stage:
     """One stage of the pipeline.
 
     Attributes:
-        name: name of the stage and of its folder.
-        parameters: dotted keys of parameters or tables that the stage depends on.
-        follows: stages whose products it reads.
-        pads: whether it reads only the pad table of the geometry. Its ``parameters`` then include the inputs of this
+        name: Name of the stage and of its folder.
+        parameters: Dotted keys of parameters or tables that the stage depends on.
+        follows: Stages whose products it reads.
+        pads: Whether it reads only the pad table of the geometry. Its ``parameters`` then include the inputs of this
             table, so that other changes of the geometry do not make it stale.
-        products: files that it writes, relative to the run folder.
-        on_top: files that also appear at the top of the run folder.
-        without: dotted keys within ``parameters`` that it does not depend on.
+        products: Files that it writes, relative to the run folder.
+        on_top: Files that also appear at the top of the run folder.
+        without: Dotted keys within ``parameters`` that it does not depend on.
     """
 
     name: str

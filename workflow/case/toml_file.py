@@ -17,7 +17,7 @@ def read_text(path: Path) -> str:
     """Read the text of a TOML file without its byte order mark.
 
     Raises:
-        CaseError: the file is missing, not a regular file, too large, or not UTF-8.
+        CaseError: The file is missing, not a regular file, too large, or not UTF-8.
     """
     fault = fault_of(path, MOST_BYTES)
     if fault:
@@ -35,11 +35,11 @@ def parse_toml(source: str, text: str) -> dict:
     """Parse a TOML text.
 
     Args:
-        source: name of the text in errors.
-        text: the text.
+        source: Name of the text in errors.
+        text: The text.
 
     Raises:
-        CaseError: the text is not TOML; with line and column.
+        CaseError: The text is not TOML; with line and column.
     """
     try:
         table = tomllib.loads(text)

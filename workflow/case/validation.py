@@ -7,7 +7,7 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 from reflowshock.problem import Problem
 from reflowshock.workflow.case import fields
 from reflowshock.workflow.case.names import wrong_name
@@ -19,10 +19,10 @@ def translate(model: type[BaseModel], error: ValidationError, table: dict, repor
     """Translate validation errors.
 
     Args:
-        model: the validated model.
-        error: error of pydantic.
-        table: table as written by the user.
-        reported: keys with a problem already reported, which are skipped.
+        model: The validated model.
+        error: Error of pydantic.
+        table: Table as written by the user.
+        reported: Keys with a problem already reported, which are skipped.
 
     Returns:
         One problem per key.
@@ -66,7 +66,7 @@ def _problem(root: type[BaseModel], names: list[str], record: ErrorDetails, tabl
 
 def _meant(root: type[BaseModel], names: list[str], siblings: list[str]) -> str:
     """Return the existing key nearest to an unknown one, in the same or another table, or an empty string."""
-    sibling = nearest(names[-1], siblings) or next((key for key in siblings if key.startswith(names[-1])), "")
+    sibling = find_nearest(names[-1], siblings) or next((key for key in siblings if key.startswith(names[-1])), "")
     same_table = ".".join([*names[:-1], sibling]) if sibling else ""
     elsewhere = min(_places(root, names[-1]), key=len, default="")
     return elsewhere or same_table if len(names) == 1 else same_table or elsewhere
@@ -87,26 +87,27 @@ def _explained(names: list[str], record: ErrorDetails, table: dict) -> Problem:
     context, value = record["ctx"], _value(table, names)
     choices = context.get("names", ())
     allowed = context.get("allowed", "one of " + ", ".join(choices))
-    return Problem(".".join(names), record["msg"], value, allowed, nearest(str(value), choices))
+    return Problem(".".join(names), record["msg"], value, allowed, find_nearest(str(value), choices))
 
 
 def _kind_problem(key: str, value: Any, field: FieldInfo) -> Problem:
-    """Return the problem of a table with a missing or unknown ``kind``."""
-    kinds = [fields.tag_of(candidate) for candidate in fields.models_of(field)]
+    """Return the problem of a table with a missing or unknown tag, such as its ``kind``."""
+    candidates = fields.models_of(field)
+    tag, kinds = fields.tag_key(candidates[0]), [fields.tag_of(candidate) for candidate in candidates]
     choice = "one of " + ", ".join(kinds)
     if not isinstance(value, dict):
         return Problem(key, "must be a table", value)
-    if "kind" not in value:
-        return Problem(f"{key}.kind", "is missing", None, choice)
-    kind = str(value["kind"])
-    return Problem(f"{key}.kind", "unknown kind", kind, choice, nearest(kind, kinds))
+    if tag not in value:
+        return Problem(f"{key}.{tag}", "is missing", None, choice)
+    name = str(value[tag])
+    return Problem(f"{key}.{tag}", f"unknown {tag}", name, choice, find_nearest(name, kinds))
 
 
 def _nearest_name(value: Any, field: FieldInfo) -> str:
     """Return the valid name nearest to a wrong one, which may be an item of a list."""
     valid = fields.literal_names(field)
     wrong = [str(item) for item in (value if isinstance(value, list) else [value]) if item not in valid]
-    return nearest(wrong[0], valid) if wrong else ""
+    return find_nearest(wrong[0], valid) if wrong else ""
 
 
 def _names(model: type[BaseModel], location: Sequence[int | str]) -> list[str]:

@@ -10,7 +10,7 @@ from rich.table import Table
 from reflowshock.problem import Problem
 from reflowshock.workflow import __version__
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.compare.runs import ComparedRun, differing, joints, parameters, results
+from reflowshock.workflow.compare.runs import ComparedRun, joints, parameters, results, select_differing
 from reflowshock.workflow.report.charts import Axis, Chart, Series
 from reflowshock.workflow.report.colours import CYCLE
 from reflowshock.workflow.report.curves import MEGA, MILLI, TIME
@@ -24,7 +24,7 @@ LINES = ("solid", "dashed", "dotted")
 
 def show(runs: Sequence[ComparedRun], console: Console) -> None:
     """Print the parameters and results in which runs differ."""
-    changed, different = parameters(runs), differing(results(runs))
+    changed, different = parameters(runs), select_differing(results(runs))
     console.print(_table(changed) if changed["rows"] else "all parameters are equal")
     console.print(
         _table(different | {"rows": different["rows"][:MOST_ROWS]}) if different["rows"] else "all results are equal"

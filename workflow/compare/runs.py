@@ -107,7 +107,7 @@ def results(runs: Sequence[ComparedRun]) -> dict:
     return _table("result", runs, [*_verdicts(runs), *_ratios(runs), *rows])
 
 
-def differing(table: Mapping[str, Any]) -> dict:
+def select_differing(table: Mapping[str, Any]) -> dict:
     """Return a table with only the rows in which columns differ."""
     return {"head": table["head"], "rows": [row for row in table["rows"] if len(set(row[1:])) > 1]}
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 from reflowshock.problem import Problem
 from reflowshock.units import UnitError, to_si
 from reflowshock.workflow.case.names import is_name, wrong_name
@@ -93,7 +93,7 @@ def write_case(path: Path, component: str, name: str | None, lengths: dict[str, 
     if component not in layout.components:
         references = list(layout.components)
         allowed = ", ".join(references[:8]) + (", …" if len(references) > 8 else "")
-        hint = nearest(component, references)
+        hint = find_nearest(component, references)
         problem = Problem("--component", "is not on the board", component, allowed or "none", hint)
         raise CaseError("import", [problem])
     name = name or f"{path.stem}_{component}".replace(" ", "_")

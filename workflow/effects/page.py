@@ -9,9 +9,9 @@ from rich.table import Table
 from reflowshock.effect import Effect
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.effects.registry import registry
-from reflowshock.workflow.effects.table import CAPTION, HEAD, MEASURED, measured, per_cent, rows
+from reflowshock.workflow.effects.table import CAPTION, HEAD, MEASURED, per_cent, read_measured_ratios, rows
 from reflowshock.workflow.kinds import kind_of
-from reflowshock.workflow.process.terminal import new_table, styled
+from reflowshock.workflow.process.terminal import new_table, style_text
 
 FIELDS = (
     ("adds", "adds"),
@@ -25,13 +25,13 @@ FIELDS = (
 def show_registry(console: Console) -> None:
     """Print every effect of the program."""
     for stage in dict.fromkeys(effect.stage for effect in registry().values()):
-        table = new_table(f"\nEffects of the {stage}", "effect", "", "what")
+        table = new_table(f"\nEffects of the {stage}", "effect", "", "description")
         for effect in registry().values():
             if effect.stage == stage:
                 _add(table, effect)
         console.print(table)
     console.print(
-        styled("\n[dim]An effect that is off costs nothing. `reflowshock effects CASE` shows which effects act.")
+        style_text("\n[dim]An effect that is off costs nothing. `reflowshock effects CASE` shows which effects act.")
     )
 
 
@@ -39,19 +39,21 @@ def _add(table: Table, effect: Effect) -> None:
     lines = [(title, getattr(effect, name)) for name, title in FIELDS]
     if effect.threshold is not None:
         lines.insert(2, ("threshold", f"acts {effect.acts} {effect.threshold:g}"))
-    if effect.name in measured():
-        lines.append(("cost", f"adds {per_cent(measured()[effect.name] - 1.0)} to a step ({MEASURED.name})"))
+    if effect.name in read_measured_ratios():
+        lines.append(
+            ("cost", f"adds {per_cent(read_measured_ratios()[effect.name] - 1.0)} to a step ({MEASURED.name})")
+        )
     lines.append(("source", effect.source))
     for row, (title, text) in enumerate(lines):
         name = effect.name.replace("_", " ") if row == 0 else ""
-        table.add_row(styled("[bold]{}[/]", name), styled("[dim]{}[/]", title), text)
+        table.add_row(style_text("[bold]{}[/]", name), style_text("[dim]{}[/]", title), text)
 
 
 def effects_table(case: Case, effects: Mapping[str, Any], of_what: str) -> Table:
     """Return the effects of a case: on or off, expected influence, share of the cost, why."""
     table = new_table(f"\nEffects of the {of_what}", *HEAD)
     for name, acts, influence, cost, why in rows(case, effects):
-        table.add_row(name, styled("[green]on[/]" if acts else "[dim]off[/]"), influence, cost, why)
+        table.add_row(name, style_text("[green]on[/]" if acts else "[dim]off[/]"), influence, cost, why)
     for column in table.columns[2:4]:
         column.justify = "right"
     table.caption, table.caption_justify = CAPTION, "left"

@@ -5,7 +5,7 @@ from functools import cache
 from reflowshock.effect import Effect
 
 # Suffix of an effect whose name an earlier stage already uses.
-APART = "_in_the_shock"
+SHOCK_SUFFIX = "_in_the_shock"
 
 
 @cache
@@ -24,8 +24,8 @@ def effect_of(name: str, reflowed: bool) -> Effect | None:
     """Return the effect with a name in a plan or record, or None for loads and parts of the method.
 
     Args:
-        name: name in the plan or record.
-        reflowed: whether the case has a reflow, whose effects take precedence if names are equal.
+        name: Name in the plan or record.
+        reflowed: Whether the case has a reflow, whose effects take precedence if names are equal.
     """
     effects = registry()
-    return effects.get(name if reflowed else f"{name}{APART}", effects.get(name))
+    return effects.get(name if reflowed else f"{name}{SHOCK_SUFFIX}", effects.get(name))

@@ -1,6 +1,6 @@
 """Table of the effects of a case: state, expected influence, reason, and predicted share of the cost.
 
-The cost of an effect is predicted from the forecast of the case with the effect toggled (``Effect.other_way``), or from
+The cost of an effect is predicted from the forecast of the case with the effect toggled (``Effect.toggled``), or from
 ratios measured by ``benchmarks/effects.py`` (``costs.json``). The ``influence`` of a decision is the expected relative
 change of the result.
 """
@@ -22,7 +22,7 @@ MEASURED = Path(__file__).with_name("costs.json")  # written by benchmarks/effec
 
 
 @cache
-def measured() -> dict[str, float]:
+def read_measured_ratios() -> dict[str, float]:
     """Return measured ratios of the processor time per step with and without an effect, by effect."""
     return {name: item["ratio"] for name, item in json.loads(MEASURED.read_text(encoding="utf-8"))["effects"].items()}
 
@@ -40,25 +40,25 @@ def cost_shares(case: Case, effects: Mapping[str, Any]) -> dict[str, float]:
     shares = {}
     for name, decision in effects.items():
         sign = 1.0 if decision["on"] else -1.0
-        other = _other_way(case, name, seconds, decision["on"])
+        other = _toggled_seconds(case, name, seconds, decision["on"])
         if other is not None and total > 0.0:
             shares[name] = sign * (1.0 - other / total)
     return shares
 
 
-def _other_way(case: Case, name: str, seconds: Mapping[str, float], acts: bool) -> float | None:
+def _toggled_seconds(case: Case, name: str, seconds: Mapping[str, float], acts: bool) -> float | None:
     """Return the predicted cost of the case with an effect toggled [s], or None if it cannot be predicted."""
     total, effects = sum(seconds.values()), {effect.name: effect for effect in kind_of(case).effects}
-    switched = effects[name].other_way(case, acts) if name in effects else None
+    switched = effects[name].toggled(case, acts) if name in effects else None
     if switched is not None:
         try:
             return sum(kind_of(switched).forecast(switched).seconds.values())
         except CaseError:
-            return None  # the case could not be run that way
+            return None  # the case is invalid with the effect toggled
     effect = effect_of(name, reflowed="reflow" in case.pipeline.names)
-    if effect is None or effect.name not in measured() or effect.stage not in seconds:
+    if effect is None or effect.name not in read_measured_ratios() or effect.stage not in seconds:
         return None
-    ratio = measured()[effect.name]
+    ratio = read_measured_ratios()[effect.name]
     return total + seconds[effect.stage] * ((1.0 / ratio if acts else ratio) - 1.0)
 
 

@@ -6,6 +6,8 @@ The wall time of a step is a constant plus a share of each particle. All constan
 from dataclasses import dataclass
 from typing import Protocol
 
+from reflowshock.particles.flows.flow import FlowScene
+
 # Flow in a plane, one core of an AMD EPYC: cases/dam_break.
 SECONDS_PER_STEP, SECONDS_PER_PARTICLE = 1.3e-4, 2.9e-7
 # Flow in space with a triangulated surface, one core of an Intel Xeon: drops of ink with 280 to 28 768 particles,
@@ -58,19 +60,21 @@ class Cost:
         )
 
 
-def plane_costs(scene: Sized, steps: int, shear_factor: float) -> dict[str, Cost]:
-    """Return the cost of a flow in a plane on "cpu" (one core) and "cuda".
+def plane_costs(scene: FlowScene, steps: int, shear_factor: float) -> dict[str, Cost]:
+    """Return the cost of a flow in a plane on the devices of its method: "cpu" (one core) and "cuda".
 
     Args:
         scene: Scene with its particles.
         steps: Number of time steps.
         shear_factor: `SHEAR_COST` if the viscosity depends on the shear rate, else 1.
     """
-    each = SECONDS_PER_PARTICLE * shear_factor
-    return {
-        "cpu": Cost(steps, SECONDS_PER_STEP, each * scene.particles),
+    factor = scene.numerics.relative_cost
+    each = SECONDS_PER_PARTICLE * shear_factor * factor
+    costs = {
+        "cpu": Cost(steps, SECONDS_PER_STEP * factor, each * scene.particles),
         "cuda": Cost(steps, SECONDS_PER_GPU_STEP, SECONDS_PER_GPU_PARTICLE * scene.particles),
     }
+    return {device: costs[device] for device in scene.numerics.devices}
 
 
 def surface_costs(scene: Sized, steps: int, shear_factor: float) -> dict[str, Cost]:

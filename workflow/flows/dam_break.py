@@ -40,7 +40,11 @@ class DamBreakCase(FlowCase):
 
 
 def dam_problems(case: DamBreakCase) -> list[Problem]:
-    """Find a column that does not fit into its tank, and a sensor that is not at the wall."""
+    """Find a column that does not fit into its tank, and a sensor that is not at the wall.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
+    """
     dam, problems = case.dam_break, rheology_problems("dam_break", case.dam_break)
     if dam.width > dam.tank_length - dam.spacing:
         allowed = f"> dam_break.width = {metres(dam.width)}"
@@ -58,9 +62,9 @@ def dam_problems(case: DamBreakCase) -> list[Problem]:
 
 
 def _solve(scene: DamBreak, _folder: Path, progress: Callable[[float], None], checkpoint: "Checkpoint") -> "FlowResult":
-    from reflowshock.particles.sph_flows.dam_break import solve_dam_break
+    from reflowshock.particles.flows.methods import solve_flow
 
-    return solve_dam_break(scene, progress, checkpoint)
+    return solve_flow(scene, progress, checkpoint)
 
 
 def dam_curves(dam: DamBreak, result: "FlowResult") -> "list[Chart]":

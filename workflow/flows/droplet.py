@@ -55,7 +55,11 @@ class DropletCase(FlowCase):
 
 
 def droplet_problems(case: DropletCase) -> list[Problem]:
-    """Find values that are given twice or have no meaning, a speed of sound too low, and particles too large."""
+    """Find values that are given twice or have no meaning, a speed of sound too low, and particles too large.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
+    """
     drop = case.droplet
     problems = _number_problems(drop) + particle_problems("droplet", drop)
     problems += rheology_problems("droplet", drop) + _hysteresis_problems(drop)
@@ -106,6 +110,9 @@ def particle_problems(kind: str, drop: Droplet) -> list[Problem]:
     Args:
         kind: Table of the scene in the case file.
         drop: Parameters of one drop.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
     """
     problems, numerics = [], drop.numerics
     if numerics.spacing is not None and numerics.particles_per_diameter is not None:
@@ -125,9 +132,9 @@ def particle_problems(kind: str, drop: Droplet) -> list[Problem]:
 
 
 def _solve(scene: Droplet, _folder: Path, progress: Callable[[float], None], checkpoint: "Checkpoint") -> "FlowResult":
-    from reflowshock.particles.sph_flows.droplet import solve_droplet
+    from reflowshock.particles.flows.methods import solve_flow
 
-    return solve_droplet(scene, progress, checkpoint)
+    return solve_flow(scene, progress, checkpoint)
 
 
 def _limits(scene: Droplet) -> dict[str, float]:
@@ -151,7 +158,7 @@ def droplet_curves(drop: Droplet, result: "FlowResult") -> "list[Chart]":
         Series("kinetic", time, history["kinetic_energy"] / surface, ORANGE),
         Series("surface and wall", time, history["surface_energy"] / surface),
     ]
-    if drop.impact_speed:  # its pressure is that of sound waves, which decay slowly
+    if drop.impact_speed:  # sound waves dominate its pressure and decay slowly
         label, motion = "largest speed / impact speed", history["largest_speed"] / drop.impact_speed
         total = (history["kinetic_energy"] + history["surface_energy"]) / surface
         energies.append(Series("total", time, total, RED))

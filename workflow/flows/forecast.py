@@ -1,4 +1,4 @@
-"""Forecast of a flow by delta-SPH: effects, particles, time steps and cost, and its table of the plan."""
+"""Forecast of a flow: effects, particles, time steps and cost, and its table of the plan."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -51,7 +51,7 @@ def forecast_flow(flow: FlowKind, case: FlowCase) -> FlowForecast:
     steps = ceil(scene.until / step)
     shear_factor = SHEAR_COST if effects["shear_dependent_viscosity"]["on"] else 1.0
     by_device = flow.costs(scene, steps, shear_factor)
-    chosen = by_device.get(scene.numerics.device, by_device["cpu"])
+    chosen = by_device.get(getattr(scene.numerics, "device", "cpu"), by_device["cpu"])
     return FlowForecast(effects, scene.particles, scene.spacing, step, steps, {STAGE: chosen.seconds}, by_device)
 
 
@@ -68,11 +68,7 @@ def flow_tables(flow: FlowKind, case: FlowCase, forecast: FlowForecast) -> Itera
     rows: list[Row] = [
         ("particles", f"{forecast.particles}", f"{spacing} initial spacing"),
         ("Reynolds number", f"{scene.reynolds_number:.3g}", f"{length} at {from_si(scene.fastest, 'm/s', digits=3)}"),
-        (
-            "speed of sound",
-            from_si(scene.sound, "m/s", digits=3),
-            f"{scene.numerics.sound_speed:g} times the largest expected speed",
-        ),
+        *_sound_rows(scene),
         ("time step", short(forecast.time_step), f"{forecast.steps} steps for {short(scene.until)}"),
         *_device_rows(forecast, scene.dimension),
         *flow.plan_rows(scene),
@@ -81,6 +77,14 @@ def flow_tables(flow: FlowKind, case: FlowCase, forecast: FlowForecast) -> Itera
     for row in rows:
         table.add_row(*row)
     yield table
+
+
+def _sound_rows(scene: FlowScene) -> Iterator[Row]:
+    """Yield the speed of sound of a compressible method."""
+    sound = scene.numerics.sound(scene.fastest)
+    if sound is not None:
+        times = f"{sound / scene.fastest:g} times the largest expected speed"
+        yield "speed of sound", from_si(sound, "m/s", digits=3), times
 
 
 def _device_rows(forecast: FlowForecast, dimension: int) -> Iterator[Row]:

@@ -31,16 +31,20 @@ class PoiseuilleCase(FlowCase):
 
 
 def channel_problems(case: PoiseuilleCase) -> list[Problem]:
-    """Find a viscosity law with foreign keys, a Reynolds number that is too large, and missing viscosity."""
+    """Find a viscosity law with foreign keys, a Reynolds number that is too large, and missing viscosity.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
+    """
     return rheology_problems(case.kind, case.scene) + viscosity_problems(case.kind, case.scene)
 
 
 def _solve(
     scene: Poiseuille, _folder: Path, progress: Callable[[float], None], checkpoint: "Checkpoint"
 ) -> "FlowResult":
-    from reflowshock.particles.sph_flows.viscous_flows import solve_poiseuille
+    from reflowshock.particles.flows.methods import solve_flow
 
-    return solve_poiseuille(scene, progress, checkpoint)
+    return solve_flow(scene, progress, checkpoint)
 
 
 def channel_curves(scene: Poiseuille, result: "FlowResult") -> "list[Chart]":

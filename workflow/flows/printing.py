@@ -43,7 +43,11 @@ class PrintingCase(FlowCase):
 
 
 def printing_problems(case: PrintingCase) -> list[Problem]:
-    """Find drops that pile up, particles too large, a speed of sound too low, short delays, and impossible freezing."""
+    """Find drops that pile up, particles too large, a speed of sound too low, short delays, and impossible freezing.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
+    """
     scene = case.printing
     problems = particle_problems("printing", scene.drop) + rheology_problems("printing", scene)
     least = LEAST_PITCH * scene.length

@@ -1,6 +1,7 @@
 """Checks that several flows share: rheology and viscosity; texts of lengths and angles in messages."""
 
 from reflowshock.particles.flows.flow import FlowScene
+from reflowshock.particles.flows.methods import SOLVERS, computes
 from reflowshock.particles.flows.rheology import Rheology
 from reflowshock.problem import Problem
 from reflowshock.units import from_si
@@ -9,12 +10,21 @@ LARGEST_REYNOLDS = 1000.0  # of vortices and channels: above it the flow becomes
 
 
 def rheology_problems(kind: str, scene: FlowScene) -> list[Problem]:
-    """Find keys of the other viscosity law, and a viscosity at infinity that is not below the one at rest.
+    """Find a method that does not compute the flow, and contradictions in the viscosity law.
+
+    These are keys of the other law, and a viscosity at infinity that is not below the one at rest.
 
     Args:
         kind: Table of the scene in the case file.
         scene: Parameters of the flow.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
     """
+    if not computes(scene):
+        flows = ", ".join(name for name, solvers in SOLVERS.items() if type(scene).__name__ in solvers)
+        message = "does not compute this flow"
+        return [Problem(f"{kind}.numerics.method", message, scene.numerics.method, flows)]
     rheology: Rheology | None = scene.rheology
     if rheology is None:
         return []
@@ -36,6 +46,9 @@ def viscosity_problems(kind: str, scene: FlowScene) -> list[Problem]:
     Args:
         kind: Table of the scene in the case file.
         scene: Parameters of the flow.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
     """
     problems = []
     if scene.reynolds_number > LARGEST_REYNOLDS:

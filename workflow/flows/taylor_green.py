@@ -29,7 +29,11 @@ class TaylorGreenCase(FlowCase):
 
 
 def vortex_problems(case: TaylorGreenCase) -> list[Problem]:
-    """Find a viscosity that is not constant, a Reynolds number that is too large, and missing viscosity."""
+    """Find a viscosity that is not constant, a Reynolds number that is too large, and missing viscosity.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
+    """
     scene = case.taylor_green
     problems = rheology_problems(case.kind, scene)
     if scene.rheology is not None:
@@ -41,9 +45,9 @@ def vortex_problems(case: TaylorGreenCase) -> list[Problem]:
 def _solve(
     scene: TaylorGreen, _folder: Path, progress: Callable[[float], None], checkpoint: "Checkpoint"
 ) -> "FlowResult":
-    from reflowshock.particles.sph_flows.viscous_flows import solve_taylor_green
+    from reflowshock.particles.flows.methods import solve_flow
 
-    return solve_taylor_green(scene, progress, checkpoint)
+    return solve_flow(scene, progress, checkpoint)
 
 
 def vortex_curves(_scene: TaylorGreen, result: "FlowResult") -> "list[Chart]":

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from reflowshock.workflow.jobs.engine import SAID, JobOutput, failures_of, last_words, snakemake
+from reflowshock.workflow.jobs.engine import SNAKEMAKE_LOG, JobOutput, failures_of, last_lines, snakemake
 from reflowshock.workflow.jobs.executor import Executor, Jobs, Local, Slurm
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import discard
@@ -17,7 +17,7 @@ from reflowshock.workflow.store.view import show
 
 BATCH = "batch"  # folder in the store: jobs, logs and marks of the last call
 JOBS = f"{BATCH}/jobs.json"
-UNTRIED = "was not started"
+NOT_STARTED = "was not started"
 LEAST_FREE = 2**20  # free bytes below which a full device explains a silent end
 
 
@@ -26,12 +26,12 @@ class Machine:
     """Resources for computing points.
 
     Attributes:
-        cores: number of available cores.
-        exclusive: whether stages run one at a time with all cores, for undisturbed measurements.
-        oversubscribe: whether MPI may have more ranks than cores.
-        slurm: cluster executor, or None for this machine.
-        live: whether stages show their progress on the terminal.
-        each_second: function called every second during the computation, and once at the end.
+        cores: Number of available cores.
+        exclusive: Whether stages run one at a time with all cores, for undisturbed measurements.
+        oversubscribe: Whether MPI may have more ranks than cores.
+        slurm: Cluster executor, or None for this machine.
+        live: Whether stages show their progress on the terminal.
+        each_second: Function called every second during the computation, and once at the end.
     """
 
     cores: int
@@ -68,9 +68,9 @@ class Job:
     """Product to be made.
 
     Attributes:
-        stage: stage that makes the product.
-        point: first point that needs the product.
-        needs: names of the jobs whose products the stage reads.
+        stage: Stage that makes the product.
+        point: First point that needs the product.
+        needs: Names of the jobs whose products the stage reads.
     """
 
     stage: str
@@ -103,7 +103,7 @@ def job_name(point: Point, stage: str) -> str:
     return f"{stage}-{point.digests[stage]}"
 
 
-def missing(store: Store, points: Sequence[Point], until: str) -> list[Job]:
+def list_missing(store: Store, points: Sequence[Point], until: str) -> list[Job]:
     """List the missing products of points, up to one stage, without duplicates."""
     jobs: dict[str, Job] = {}
     for point in points:
@@ -146,12 +146,12 @@ def run_points(
         Reason of failure by key of each incomplete point.
 
     Raises:
-        RunFolderBusy: jobs of an earlier command are still running in the store.
+        RunFolderBusy: Jobs of an earlier command are still running in the store.
     """
     tried: set[str] = set()
     try:
         while True:
-            jobs = missing(store, points, until)
+            jobs = list_missing(store, points, until)
             if not jobs or any(job.name in tried for job in jobs):
                 break
             tried |= {job.name for job in jobs}
@@ -162,10 +162,10 @@ def run_points(
     finally:
         for point in points:
             show_products(store, point)
-    return {point.key: reason for point in points if (reason := why(store, point, until))}
+    return {point.key: reason for point in points if (reason := failure_message(store, point, until))}
 
 
-def why(store: Store, point: Point, until: str) -> str:
+def failure_message(store: Store, point: Point, until: str) -> str:
     """Return the first missing stage of an incomplete point and its message; empty if the point is complete."""
     failure = failure_of(store, point, until)
     return f"stage {failure[0]}: {failure[1]}" if failure else ""
@@ -188,12 +188,12 @@ def log_of(store: Store, point: Point, stage: str) -> Path:
 
 def _describe_silent_end(store: Store, point: Point, stage: str, state: StageState) -> str:
     """Describe the end of a stage that left no message."""
-    name, output, log = job_name(point, stage), store.home / SAID, log_of(store, point, stage)
+    name, output, log = job_name(point, stage), store.home / SNAKEMAKE_LOG, log_of(store, point, stage)
     if by_cluster := failures_of(output).get(name):
         return f"{by_cluster}; see {output}"
     if not log.exists():
-        reason = UNTRIED if state.missing else f"{UNTRIED}: {why_stale(state)}"
-        return f"{reason}; see {output}\n{last_words(store.home)}" if output.is_file() else reason
+        reason = NOT_STARTED if state.missing else f"{NOT_STARTED}: {why_stale(state)}"
+        return f"{reason}; see {output}\n{last_lines(store.home)}" if output.is_file() else reason
     words = log.read_text(encoding="utf-8", errors="replace").strip().splitlines()
     last = f'; last output: "{words[-1].strip()}"' if words else ""
     if shutil.disk_usage(store.home).free < LEAST_FREE:

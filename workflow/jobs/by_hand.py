@@ -5,14 +5,14 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from reflowshock.workflow.jobs.batch import BATCH, Machine, missing, write_jobs
+from reflowshock.workflow.jobs.batch import BATCH, Machine, list_missing, write_jobs
 from reflowshock.workflow.pipeline.reader import read_case
-from reflowshock.workflow.store.folders import locked
+from reflowshock.workflow.store.folders import lock_folder
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import discard
 from reflowshock.workflow.store.store import Store
 
-_held = ExitStack()  # holds the lock of the run folder until Snakemake ends
+_locks = ExitStack()  # holds the lock of the run folder until Snakemake ends
 
 
 def prepare_run(config: Mapping[str, Any], cores: int) -> tuple[Store, Point]:
@@ -20,18 +20,18 @@ def prepare_run(config: Mapping[str, Any], cores: int) -> tuple[Store, Point]:
 
     Args:
         config: ``case`` and, optionally, ``set``, ``out``, ``oversubscribe``.
-        cores: number of cores for Snakemake.
+        cores: Number of cores for Snakemake.
 
     Raises:
-        CaseError: the case or the run folder is invalid.
-        RunFolderBusy: another run is active in the folder.
+        CaseError: The case or the run folder is invalid.
+        RunFolderBusy: Another run is active in the folder.
     """
     oversubscribe = bool(int(config.get("oversubscribe", 0)))
     case = read_case(Path(config["case"]), config.get("set", []), oversubscribe)
     folder = Path(config.get("out", f"runs/{case.run_name}")).resolve()
     store, point = Store(folder, one_run=True), Point({}, case)
-    _held.enter_context(locked(folder, "run", case.case.name))
-    jobs = missing(store, [point], case.pipeline.names[-1])
+    _locks.enter_context(lock_folder(folder, "run", case.case.name))
+    jobs = list_missing(store, [point], case.pipeline.names[-1])
     discard(store.home / BATCH)
     for job in jobs:
         store.prepare_work(point, job.stage)

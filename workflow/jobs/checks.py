@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 from reflowshock.problem import Problem
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.problems import CaseError
@@ -21,7 +21,7 @@ PLUGIN = "snakemake_executor_plugin_slurm"
 
 
 class NoAnswer(RuntimeError):
-    """Failure of a Slurm command; the message contains its output."""
+    """Error of a Slurm command; the message contains its output."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,14 +86,14 @@ def check_slurm(profile: Profile, cases: Sequence[Case]) -> Partition:
     """Check that jobs can be submitted and that the cases fit into the partition.
 
     Args:
-        profile: profile of the cluster.
-        cases: cases to run.
+        profile: Profile of the cluster.
+        cases: Cases to run.
 
     Returns:
         The partition of the jobs.
 
     Raises:
-        CaseError: jobs cannot be submitted, or a case is too large; with all problems.
+        CaseError: Jobs cannot be submitted, or a case is too large; with all problems.
     """
     problems = list(_missing())
     if problems:
@@ -126,7 +126,7 @@ def _select_partition(profile: Profile, available: Sequence[Partition]) -> Parti
         return next((partition for partition in available if partition.is_default), available[0])
     names = [partition.name for partition in available]
     if profile.partition not in names:
-        key, hint = "default-resources.slurm_partition", nearest(profile.partition, names)
+        key, hint = "default-resources.slurm_partition", find_nearest(profile.partition, names)
         problem = Problem(key, "is not a partition here", profile.partition, ", ".join(names), hint)
         raise CaseError(str(profile.folder / FILE), [problem])
     return available[names.index(profile.partition)]

@@ -21,7 +21,7 @@ OUTPUT = re.compile(r"^\s+output: (?P<mark>\S+)", re.MULTILINE)
 
 
 SNAKEFILE = Path(__file__).parents[1] / "Snakefile"
-SAID = "batch/snakemake.txt"  # output of Snakemake, relative to the store
+SNAKEMAKE_LOG = "batch/snakemake.txt"  # output of Snakemake, relative to the store
 LAST_LINES = 12
 
 
@@ -37,17 +37,17 @@ def snakemake(
     All paths on its command line and in its rules are relative to the store, its working directory.
 
     Args:
-        home: folder of the store.
-        executor: executor of the stages.
-        arguments: additional arguments of Snakemake.
-        lock: file descriptor from ``locked``, inherited by Snakemake.
-        each_second: function called every second while Snakemake runs, and once at the end.
+        home: Folder of the store.
+        executor: Executor of the stages.
+        arguments: Additional arguments of Snakemake.
+        lock: File descriptor from ``locked``, inherited by Snakemake.
+        each_second: Function called every second while Snakemake runs, and once at the end.
 
     Returns:
         Whether all jobs succeeded.
 
     Raises:
-        RunFolderBusy: jobs of an earlier command are still running in the store.
+        RunFolderBusy: Jobs of an earlier command are still running in the store.
     """
     jobs = " ".join(executor.left_over(home))
     if jobs:
@@ -60,9 +60,9 @@ def snakemake(
     ]  # fmt: skip
     environment = os.environ | {"OMP_NUM_THREADS": "1"} | executor.environment
     report_progress = each_second or (lambda: None)
-    with (home / SAID).open("w") as said:
+    with (home / SNAKEMAKE_LOG).open("w") as log:
         process = subprocess.Popen(
-            command, env=environment, cwd=home, stderr=said, start_new_session=True, pass_fds=(lock,)
+            command, env=environment, cwd=home, stderr=log, start_new_session=True, pass_fds=(lock,)
         )
         try:
             while True:
@@ -76,9 +76,9 @@ def snakemake(
             raise
 
 
-def last_words(home: Path) -> str:
+def last_lines(home: Path) -> str:
     """Return the last lines of Snakemake's output."""
-    path = home / SAID
+    path = home / SNAKEMAKE_LOG
     lines = path.read_text(encoding="utf-8", errors="replace").strip().splitlines() if path.is_file() else []
     return "\n".join(lines[-LAST_LINES:])
 
@@ -103,16 +103,16 @@ class JobOutput:
                 console.print(line, soft_wrap=True)
 
 
-def failures_of(said: Path) -> dict[str, str]:
+def failures_of(log: Path) -> dict[str, str]:
     """Return Snakemake's messages about failed jobs that left no message, such as jobs ended by Slurm.
 
     Args:
-        said: file with the output of Snakemake.
+        log: File with the output of Snakemake.
 
     Returns:
         Message by name of the job.
     """
-    text = said.read_text(encoding="utf-8", errors="replace") if said.is_file() else ""
+    text = log.read_text(encoding="utf-8", errors="replace") if log.is_file() else ""
     reasons = {}
     for entry in FAILED.findall(text):
         why, mark = MESSAGE.search(entry), OUTPUT.search(entry)

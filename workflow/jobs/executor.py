@@ -74,8 +74,8 @@ class Local:
     """Executor that runs stages as processes of this machine, which end with the command.
 
     Attributes:
-        cores: number of cores for all stages.
-        oversubscribe: whether MPI may have more ranks than cores.
+        cores: Number of cores for all stages.
+        oversubscribe: Whether MPI may have more ranks than cores.
     """
 
     cores: int
@@ -115,10 +115,10 @@ class Slurm:
     """Executor that runs stages as Slurm jobs, submitted, monitored and cancelled by Snakemake's plugin.
 
     Attributes:
-        profile: profile of the cluster.
-        at_once: maximum number of queued and running jobs.
-        largest: number of cores of the largest node.
-        oversubscribe: whether MPI may have more ranks than cores.
+        profile: Profile of the cluster.
+        at_once: Maximum number of queued and running jobs.
+        largest: Number of cores of the largest node.
+        oversubscribe: Whether MPI may have more ranks than cores.
     """
 
     profile: Profile
@@ -172,14 +172,14 @@ def executor_for(
     """Return the executor of the stages after checking that it is available.
 
     Args:
-        name: name of the executor.
-        profile: folder of the cluster profile; None for the default profile.
-        at_once: maximum number of cores (local) or jobs (Slurm); None for all cores or ``JOBS`` jobs.
-        oversubscribe: whether MPI may have more ranks than cores.
-        cases: cases to run.
+        name: Name of the executor.
+        profile: Folder of the cluster profile; None for the default profile.
+        at_once: Maximum number of cores (local) or jobs (Slurm); None for all cores or ``JOBS`` jobs.
+        oversubscribe: Whether MPI may have more ranks than cores.
+        cases: Cases to run.
 
     Raises:
-        CaseError: jobs cannot be submitted here, or a case is too large for the cluster.
+        CaseError: Jobs cannot be submitted here, or a case is too large for the cluster.
     """
     if name == ExecutorName.SLURM:
         chosen = read_profile(profile)

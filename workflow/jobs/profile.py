@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 from reflowshock.problem import Problem
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.toml_file import MOST_BYTES, fault_of
@@ -24,10 +24,10 @@ class Profile:
     """Values of a cluster profile that the program uses; Snakemake reads the rest of the file.
 
     Attributes:
-        folder: folder of the file.
-        partition: partition of the jobs; empty for the default of the cluster.
-        launcher: command line that starts MPI ranks within a job.
-        walltime_factor: factor on the requested wall time.
+        folder: Folder of the file.
+        partition: Partition of the jobs; empty for the default of the cluster.
+        launcher: Command line that starts MPI ranks within a job.
+        walltime_factor: Factor on the requested wall time.
     """
 
     folder: Path
@@ -40,10 +40,10 @@ def read_profile(folder: Path | None) -> Profile:
     """Read a profile.
 
     Args:
-        folder: folder of the profile; None for the user's ``profiles/slurm`` or, if missing, the shipped one.
+        folder: Folder of the profile; None for the user's ``profiles/slurm`` or, if missing, the shipped one.
 
     Raises:
-        CaseError: the file is missing or unreadable, or a value is invalid.
+        CaseError: The file is missing or unreadable, or a value is invalid.
     """
     folder = folder or (OWN if (OWN / FILE).is_file() else SHIPPED)
     path = folder / FILE
@@ -60,7 +60,7 @@ def read_profile(folder: Path | None) -> Profile:
     resources = _table(path, table, "default-resources")
     for key in config:
         if key not in KEYS:
-            message = Problem(f"config.{key}", "unknown key", config[key], ", ".join(KEYS), nearest(key, KEYS))
+            message = Problem(f"config.{key}", "unknown key", config[key], ", ".join(KEYS), find_nearest(key, KEYS))
             raise _wrong(path, message)
     launcher = str(config.get("launcher", "mpirun"))
     if not _is_command(launcher):

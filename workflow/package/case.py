@@ -9,7 +9,7 @@ from reflowshock.fem.problem.shock import Shock
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.materials.roles import Materials
 from reflowshock.meshing.board.parameters import Board, Package, Warpage
-from reflowshock.parameters import changed
+from reflowshock.parameters import with_value
 from reflowshock.particles.parameters.solder import Reflow, Solder
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.stage import Pipeline, Stage, report_of
@@ -143,7 +143,7 @@ class PackageCase(Case):
             return self
         if problems(self.package, self.board, self.warpage):
             return self
-        ispg = changed(self.solder, "numerics.scheme", "ispg")
+        ispg = with_value(self.solder, "numerics.scheme", "ispg")
         with_ispg = self.model_copy(update={"solder": ispg})
         return self if with_ispg.unverified else with_ispg
 

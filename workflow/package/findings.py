@@ -22,7 +22,11 @@ Records = Mapping[str, Mapping[str, Any]]
 
 
 def of_geometry(joints: int, elements: Mapping[str, int]) -> Findings:
-    """Return the number of joints, and the number of hexahedra in each part, as metrics."""
+    """Return the number of joints, and the number of hexahedra in each part, as metrics.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
+    """
     counts = {f"elements_{part}": metric(count) for part, count in elements.items()}
     return Findings(metrics={"joint_count": metric(joints), **counts})
 
@@ -36,6 +40,9 @@ def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
     Args:
         joints: Record of each joint, by name, from ``joints.json``.
         effects: Decision on each effect of the reflow.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
     """
     flowed = [joint for joint in joints.values() if "given" not in joint]
 
@@ -115,6 +122,9 @@ def of_surface(surfaces: Records) -> Findings:
 
     Args:
         surfaces: Measures of each surface, by name, from ``surfaces.json``.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
     """
     error = worst(surface["volume_error"] for surface in surfaces.values() if "given" not in surface)
     changes = [surface["volume_change"] for surface in surfaces.values() if "given" in surface]
@@ -131,6 +141,9 @@ def of_solder_mesh(qualities: Mapping[str, Records], effects: Mapping[str, Any])
     Args:
         qualities: Quality by kind of mesh (prefix of the metrics), then by joint.
         effects: Decision on each effect that adds joint meshes.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
     """
     metrics: dict[str, dict] = {}
     health: dict[str, dict] = {}
@@ -157,6 +170,9 @@ def of_shock(results: Mapping[str, dict], folder: Path, thickness: float) -> Fin
         results: ``result.json`` of each mode, the main mode first.
         folder: Folder of the shock, with a folder for each mode.
         thickness: Thickness of the board [m]; small kinematics need a much smaller deflection.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
     """
     first = next(iter(results))
     metrics, health = dict(results[first]["metrics"]), dict(results[first]["health"])

@@ -5,7 +5,7 @@ from collections.abc import Container, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 from reflowshock.problem import Problem
 from reflowshock.workflow.case.toml_file import resolved_path
 
@@ -38,6 +38,9 @@ def problems(package: "Package", pads: "Sequence[PadSite]", heated: bool) -> Ite
         package: Package with the names of existing files.
         pads: Pad table as drawn.
         heated: Whether pads move before solidification, so that only the reflow knows the height of a joint.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
     """
     if not package.surfaces:
         return
@@ -49,7 +52,7 @@ def problems(package: "Package", pads: "Sequence[PadSite]", heated: bool) -> Ite
         key, path = f"{KEY}.{name}", Path(text)
         if name not in sites:
             names = list(sites)
-            hint = nearest(name, names)
+            hint = find_nearest(name, names)
             yield Problem(key, "is not a joint of the model", None, f"{names[0]} to {names[-1]}", hint)
         if path.suffix.lower() not in SUFFIXES:
             yield Problem(key, "has an unknown file format", text, ", ".join(SUFFIXES))

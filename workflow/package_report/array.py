@@ -12,7 +12,7 @@ from reflowshock.arrays import Floats
 from reflowshock.meshing.surface.truncated_sphere import TruncatedSphere
 from reflowshock.workflow.package_report.joint_records import by_shape
 from reflowshock.workflow.report.colours import colour_at, ink_on
-from reflowshock.workflow.report.scene import MOST_TRIANGLES, Field, Group, Scene, decimated
+from reflowshock.workflow.report.scene import MOST_TRIANGLES, Field, Group, Scene, decimate
 
 MICRO, MILLI = 1e-6, 1e-3
 MAPS = (
@@ -44,7 +44,7 @@ def shapes_scene(run_folder: Path, joints: Sequence[Mapping[str, Any]]) -> Scene
         part = np.zeros(len(points), int)
         free = Group("solder", points, triangles[is_free], part, values={DEVIATION: distance[None]})
         wetted = Group("wetted discs", points, triangles[~is_free], part, "#8a949e")
-        for surface in decimated([free, wetted], MOST_TRIANGLES // len(joints)):
+        for surface in decimate([free, wetted], MOST_TRIANGLES // len(joints)):
             placed = [_at(surface, joint, joints.index(joint)) for joint in group if len(surface.faces)]
             kinds.setdefault(surface.name, []).extend(placed)
     joined = [_joined(groups) for groups in kinds.values() if groups]
@@ -54,6 +54,10 @@ def shapes_scene(run_folder: Path, joints: Sequence[Mapping[str, Any]]) -> Scene
 
 def joint_surface(run_folder: Path, joint: Mapping[str, Any]) -> tuple[Floats, NDArray[np.integer], NDArray[np.bool_]]:
     """Read the closed surface of a joint; without one, its free surface after reflow.
+
+    Args:
+        run_folder: Run folder with the products of reflow and surface.
+        joint: Record of the joint with its ``name`` and ``shape``, see ``joint_records``.
 
     Returns:
         Points, shape (n, 3) [m]; triangles, shape (t, 3); whether each triangle is on the free surface, shape (t,).
@@ -72,7 +76,15 @@ def joint_surface(run_folder: Path, joint: Mapping[str, Any]) -> tuple[Floats, N
 
 
 def deviation(points: Floats, joint: Mapping[str, Any]) -> Floats:
-    """Return the signed distance of points from the truncated sphere of a joint's volume and pads, shape (n,) [m]."""
+    """Return the signed distance of points from the truncated sphere of a joint's volume and pads.
+
+    Args:
+        points: Points in the frame of the joint, shape (n, 3) [m].
+        joint: Record with ``volume`` [m^3], ``wetted_radius_board`` and ``wetted_radius_package`` [m].
+
+    Returns:
+        Distances, positive outside, shape (n,) [m].
+    """
     discs = joint["wetted_radius_board"], joint["wetted_radius_package"]
     return TruncatedSphere.of_volume(joint["volume"], *discs).signed_distance(np.asarray(points, dtype=float))
 
@@ -115,17 +127,24 @@ class Map:
 
 
 def array_maps(joints: Sequence[Mapping[str, Any]]) -> list[Map]:
-    """Return the first four maps of ``MAPS`` whose quantity the joints have.
+    """Return up to four maps of the array, one for each quantity of ``MAPS`` that the joints have.
 
     Args:
         joints: Records with name, x, y [m] and quantities of ``MAPS``, see ``joint_records``.
+
+    Returns:
+        Maps with one coloured cell per joint and a colour scale.
     """
     available = [entry for entry in MAPS if any(entry[0] in joint for joint in joints)][:PANELS]
     return [_map(joints, *entry) for entry in available]
 
 
 def pitch_of(joints: Sequence[Mapping[str, Any]]) -> float:
-    """Return the smallest distance between two joints along x or y [m]; 1 mm for a single joint."""
+    """Return the smallest distance between two joints along x or y [m]; 1 mm for a single joint.
+
+    Args:
+        joints: Records with ``x`` and ``y`` [m].
+    """
     steps = [np.diff(np.unique(np.round([joint[axis] for joint in joints], 9))) for axis in ("x", "y")]
     return float(min(np.concatenate(steps), default=MILLI))
 

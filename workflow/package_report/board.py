@@ -20,11 +20,12 @@ def add_board(
     """Add curves and tables of the board to the context of a report.
 
     Args:
-        shock: Folder of the shock.
+        shock: Folder of the shock, which is read.
         case: Case of the run.
-        histories: Histories by mode, the main mode first.
-        metrics: Metrics of the run.
-        context: Context of the report.
+        histories: Mode -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity, the
+            main mode first.
+        metrics: Name -> record with ``value`` (SI) and ``unit``.
+        context: Context of the page's template, changed in place.
     """
     from reflowshock.fem.loads.shock_pulse import shock_pulse
 
@@ -43,7 +44,15 @@ def add_board(
 
 
 def watch_table(case: BoardDropCase, metrics: Mapping[str, Any]) -> dict:
-    """Return the table of peaks at the watch points; empty without watch points."""
+    """Return the table of peaks at the watch points; empty without watch points.
+
+    Args:
+        case: Case with the watch points.
+        metrics: Name -> record with ``value`` (SI) and ``unit``.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text); an empty dict without watch points.
+    """
     rows = []
     for name, point in case.watch.items():
         peaks = [metrics.get(f"{which}_acceleration@{name}") for which in ("peak", "second_peak")]
@@ -61,7 +70,12 @@ def watch_table(case: BoardDropCase, metrics: Mapping[str, Any]) -> dict:
 
 
 def watch_curves(case: BoardDropCase, histories: Histories) -> list[Chart]:
-    """Return charts of deflection and acceleration of every watch point."""
+    """Return charts of deflection and acceleration of every watch point.
+
+    Args:
+        case: Case with the watch points.
+        histories: Mode -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity.
+    """
     from reflowshock.fem.loads.shock_pulse import shock_pulse
     from reflowshock.fem.output.acceleration import drop_accelerations
 

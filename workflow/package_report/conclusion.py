@@ -23,7 +23,8 @@ def conclude(run_folder: Path, case: BoardDropCase, summary: dict, known: Discre
     Args:
         run_folder: Folder of the run.
         case: Case with the failure limits.
-        summary: Summary of all stages.
+        summary: Content of ``summary.json``, changed in place: ``verdict``, ``warnings``, ``answer`` and one metric are
+            added.
         known: Discretisation errors of the metrics.
     """
     histories, results = read_modes(run_folder / "shock")

@@ -42,21 +42,35 @@ def duration(seconds: float) -> str:
 
 
 def by_role(counts_of: Mapping[str, int]) -> str:
-    """Return the number of each model, as text."""
+    """Return counts of each model as text, such as "120 macro + 80 meso".
+
+    Args:
+        counts_of: Role of the model ("macro", "meso") -> count. For a single role the count is written alone.
+    """
     if len(counts_of) == 1:
         return number(next(iter(counts_of.values())))
     return " + ".join(f"{number(count)} {role}" for role, count in counts_of.items())
 
 
 def ranks(result: Record) -> str:
-    """Return the number of ranks and their placement on the models, as text."""
+    """Return the number of ranks and their placement on the models, as text.
+
+    Args:
+        result: Content of ``result.json`` of a mode, with ``model`` (``mode``, ``ranks``) and, if coupled,
+            ``coupling``.
+    """
     count = f"{result['model']['ranks']} {'rank' if result['model']['ranks'] == 1 else 'ranks'}"
     chosen = result.get("coupling", {}).get("placement", {}).get("chosen", "")
     return count if result["model"]["mode"] == "dns" or not chosen else f"{count}: {chosen}"
 
 
 def steps(result: Record) -> str:
-    """Return the time step of a DNS, or of all levels of a two-scale run, the window first."""
+    """Return the time step of a DNS, or of all levels of a two-scale run, the window first, as text.
+
+    Args:
+        result: Content of ``result.json`` of a mode, with ``model`` (``mode``, ``step``, ``window`` [s]) and
+            ``coupling``.
+    """
     model = result["model"]
     levels = result.get("coupling", {}).get("levels", ())
     if model["mode"] == "dns":
@@ -65,19 +79,36 @@ def steps(result: Record) -> str:
 
 
 def counts(model: Record) -> str:
-    """Return the number of steps of a DNS, or of the macro model and the finest level of a two-scale run."""
+    """Return the number of steps of a DNS, or of the macro model and the finest level of a two-scale run, as text.
+
+    Args:
+        model: Entry ``model`` of a ``result.json``, with ``mode``, ``windows`` and ``substeps`` (steps in each window).
+    """
     every = number(model["windows"] * model["substeps"])
     return every if model["mode"] == "dns" else f"{number(model['windows'])}, {every}"
 
 
 def memory(result: Record) -> str:
-    """Return the peak memory of all ranks together, as text; empty if it was not measured."""
+    """Return the peak memory of all ranks together, as text; empty if it was not measured.
+
+    Args:
+        result: Content of ``result.json`` of a mode, with ``metrics``.
+    """
     peak = result["metrics"].get("peak_memory")
     return quantity(peak) if peak else ""
 
 
 def table(results: Mapping[str, dict], metrics: Record) -> dict | None:
-    """Return the cost table of both modes and the published ones; None unless both modes were run."""
+    """Return the cost table of both modes and the published ones; None unless both modes were run.
+
+    Args:
+        results: Mode -> content of its ``result.json`` (``model``, ``metrics``, ``health``, ``timings``, ``coupling``).
+        metrics: Name -> record with ``value`` (SI) and ``unit``.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text): columns for DNS, two-scale run and both
+        published runs; None unless both modes were run.
+    """
     if "two_scale_dns_core_ratio" not in metrics:
         return None
     ratios = {"dns": "1", "two_scale": f"{metrics['two_scale_dns_core_ratio']['value']:.3f}"}

@@ -28,7 +28,15 @@ NOTE = (
 
 
 def later_swings(shock: Shock, end: float) -> str:
-    """Return a note that later swings may be larger, for an undamped run that ended automatically at ``end`` [s]."""
+    """Return a note that later swings may be larger, for an undamped run that ended automatically at ``end`` [s].
+
+    Args:
+        shock: Parameters of the shock.
+        end: Time at which the run ended [s].
+
+    Returns:
+        Sentence with a leading space; empty if the duration is fixed or the board is damped.
+    """
     if shock.duration != "auto" or any(shock.damping.coefficients):
         return ""
     return (
@@ -41,10 +49,14 @@ def headline(metrics: Mapping[str, dict], known: Discretisation, summary: Mappin
     """Return the table of headline figures with value and errors, the common neglected effects, and a note.
 
     Args:
-        metrics: Metrics of the run.
-        known: Discretisation errors of the metrics.
-        summary: Summary of the run, with its effects.
-        results: ``result.json`` of each mode, the main mode first.
+        metrics: Name -> record with ``value`` (SI) and ``unit``.
+        known: Discretisation errors of the metrics by name.
+        summary: Content of ``summary.json``, of which ``effects`` is read.
+        results: Mode -> content of its ``result.json`` (``model``, ``metrics``, ``health``, ``timings``, ``coupling``),
+            the main mode first.
+
+    Returns:
+        Table with ``head``, ``rows`` (lists of text), ``left_out`` (neglected effects as text) and ``note``.
     """
     figures = {name: label for name, label in FIGURES if name in metrics}
     rows = [

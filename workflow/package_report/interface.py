@@ -21,7 +21,16 @@ SAME_TIME = 1e-6  # [s] modes write a picture at the end of their nearest window
 
 
 def read_interfaces(shock: Path, modes: Sequence[str]) -> dict[str, dict[str, NDArray]]:
-    """Read ``interface.npz`` of the modes that wrote one."""
+    """Read ``interface.npz`` of the modes that wrote one.
+
+    Args:
+        shock: Folder of the shock, with a folder for each mode.
+        modes: Names of the modes, in the order of the result.
+
+    Returns:
+        Mode -> arrays of ``interface.npz``: ``times`` (k,) [s] and, per joint, ``points@``, ``quads@``, ``von_mises@``
+        (k, q) [Pa]; empty if no mode wrote one.
+    """
     interfaces = {}
     for mode in modes:
         path = shock / mode / "interface.npz"
@@ -32,30 +41,63 @@ def read_interfaces(shock: Path, modes: Sequence[str]) -> dict[str, dict[str, ND
 
 
 def joints_of(interface: Arrays) -> list[str]:
-    """Return the joint names of an interface, in its order."""
+    """Return the joint names of an interface, in its order.
+
+    Args:
+        interface: Arrays of ``interface.npz``: ``times`` (k,) [s] and, per joint, ``points@``, ``quads@``,
+            ``von_mises@`` (k, q) [Pa].
+    """
     return [name.split("@")[1] for name in interface if name.startswith("von_mises@")]
 
 
 def areas(interface: Arrays, joint: str) -> NDArray[np.float64]:
-    """Return the areas of the faces of a joint, from their diagonals, shape (q,) [m^2]."""
+    """Return the areas of the faces of a joint, from their diagonals, shape (q,) [m^2].
+
+    Args:
+        interface: Arrays of ``interface.npz``: ``times`` (k,) [s] and, per joint, ``points@``, ``quads@``,
+            ``von_mises@`` (k, q) [Pa]. ``points@`` has shape (n, 3) [m], ``quads@`` shape (q, 4).
+        joint: Name of the joint.
+    """
     corners = interface[f"points@{joint}"][interface[f"quads@{joint}"]]
     diagonals = corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]
     return 0.5 * np.linalg.norm(np.cross(*diagonals), axis=1)
 
 
 def times_of(interfaces: Mapping[str, Arrays]) -> NDArray[np.float64]:
-    """Return the picture times [s] of the mode with most; a mode that ended early has fewer."""
+    """Return the picture times of the mode with the most pictures, shape (k,) [s]; a mode that ended early has fewer.
+
+    Args:
+        interfaces: Mode -> arrays of ``interface.npz``: ``times`` (k,) [s] and, per joint, ``points@``, ``quads@``,
+            ``von_mises@`` (k, q) [Pa].
+    """
     return max((interface["times"] for interface in interfaces.values()), key=len)
 
 
 def row_at(interface: Arrays, time: float) -> int | None:
-    """Return the row nearest to ``time`` [s]; None if the mode ended before."""
+    """Return the index of the picture within 1 µs of ``time`` [s]; None if the mode has none, since it ended before.
+
+    Args:
+        interface: Arrays of ``interface.npz``: ``times`` (k,) [s] and, per joint, ``points@``, ``quads@``,
+            ``von_mises@`` (k, q) [Pa].
+        time: Time [s].
+    """
     distance = np.abs(interface["times"] - time)
     return int(distance.argmin()) if distance.min(initial=np.inf) <= SAME_TIME else None
 
 
 def difference(ours: Arrays, reference: Arrays, joints: Sequence[str], time: float) -> float | None:
-    """Return the relative L2 difference of two stress fields at a time [s]; None unless both have that time."""
+    """Return the relative L2 difference of two von Mises stress fields at a time, weighted by area.
+
+    Args:
+        ours: Arrays of ``interface.npz``: ``times`` (k,) [s] and, per joint, ``points@``, ``quads@``, ``von_mises@``
+            (k, q) [Pa].
+        reference: Arrays of the other mode, whose stress norm is the divisor unless it is zero.
+        joints: Names of the joints to compare, with the same faces in both modes, see ``comparable``.
+        time: Time of the picture [s].
+
+    Returns:
+        Relative difference; None unless both modes have a picture at that time.
+    """
     row, row_of_reference = row_at(ours, time), row_at(reference, time)
     if row is None or row_of_reference is None:
         return None
@@ -68,7 +110,12 @@ def difference(ours: Arrays, reference: Arrays, joints: Sequence[str], time: flo
 
 
 def comparable(interfaces: Mapping[str, Arrays]) -> list[str]:
-    """Return the joints with the same faces in both modes; empty if only one mode was run."""
+    """Return the joints with the same faces in both modes; empty if only one mode was run.
+
+    Args:
+        interfaces: Mode -> arrays of ``interface.npz``: ``times`` (k,) [s] and, per joint, ``points@``, ``quads@``,
+            ``von_mises@`` (k, q) [Pa]; one or two modes.
+    """
     if len(interfaces) < 2:
         return []
     first, second = interfaces.values()
@@ -77,7 +124,15 @@ def comparable(interfaces: Mapping[str, Arrays]) -> list[str]:
 
 
 def table(interfaces: Mapping[str, Arrays]) -> dict:
-    """Return the table of largest stress, its joint and mean stress of each mode at each time, and their difference."""
+    """Return the table of largest stress, its joint and mean stress of each mode at each time, and their difference.
+
+    Args:
+        interfaces: Mode -> arrays of ``interface.npz``: ``times`` (k,) [s] and, per joint, ``points@``, ``quads@``,
+            ``von_mises@`` (k, q) [Pa]; one or two modes.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per picture time.
+    """
     shared = comparable(interfaces)
     rows = []
     for time in times_of(interfaces):
@@ -95,7 +150,15 @@ def table(interfaces: Mapping[str, Arrays]) -> dict:
 
 
 def interface_scene(interfaces: Mapping[str, Arrays]) -> Scene:
-    """Return a top view of the pad faces of all joints at all times, the modes side by side."""
+    """Return a top view of the pad faces of all joints, coloured by von Mises stress, the modes side by side.
+
+    Args:
+        interfaces: Mode -> arrays of ``interface.npz``: ``times`` (k,) [s] and, per joint, ``points@``, ``quads@``,
+            ``von_mises@`` (k, q) [Pa]; not empty.
+
+    Returns:
+        Interactive 3D scene for the report page, one frame per picture time.
+    """
     times, first = times_of(interfaces), next(iter(interfaces.values()))
     corners = np.concatenate([first[f"points@{joint}"] for joint in joints_of(first)])
     width, top_edge = float(np.ptp(corners[:, 0])), float(corners[:, 1].max())

@@ -17,6 +17,13 @@ def joint_records(run_folder: Path) -> list[dict]:
 
     Angles are in degrees. A surface given by the user replaces the reflow metrics. Stages that have not run contribute
     nothing.
+
+    Args:
+        run_folder: Run folder, from which ``reflow``, ``surface`` and ``solder_mesh`` are read.
+
+    Returns:
+        Records in the order of the pad table, with ``name``, ``x``, ``y`` [m], ``shape`` (name of the joint with this
+        shape), ``verdict``, and the measures that exist, such as ``standoff``, ``max_width``, ``volume``.
     """
     products = (
         read_json(run_folder / "reflow/joints.json"),
@@ -43,7 +50,11 @@ def _record(pad: Mapping, reflow: Mapping, surfaces: Mapping, quality: Mapping) 
 
 
 def by_shape(joints: Sequence[Record]) -> list[tuple[list[str], list[Record]]]:
-    """Return names and records of the joints of each distinct shape, by increasing standoff of the first joint."""
+    """Return names and records of the joints of each distinct shape, by increasing standoff of the first joint.
+
+    Args:
+        joints: Records of the joints, see ``joint_records``.
+    """
     groups: dict[str, list[Record]] = {}
     for joint in joints:
         groups.setdefault(joint["shape"], []).append(joint)
@@ -52,7 +63,11 @@ def by_shape(joints: Sequence[Record]) -> list[tuple[list[str], list[Record]]]:
 
 
 def bridge_records(run_folder: Path) -> list[dict]:
-    """Return name and mesh quality of bridged joints."""
+    """Return one record for each bridged pair: name ("A9+A10") and mesh quality; empty if none was meshed.
+
+    Args:
+        run_folder: Run folder, of which ``solder_mesh/bridged_quality.json`` is read if it exists.
+    """
     quality = _optional(run_folder / "solder_mesh/bridged_quality.json")
     return [{"name": name, "shape": name, "standoff": 0.0} | measures for name, measures in quality.items()]
 
@@ -62,7 +77,16 @@ def _optional(path: Path) -> dict:
 
 
 def record_table(columns: Iterable[Column], groups: list, chosen: Callable[[str, list], Any]) -> dict:
-    """Return a table of the columns that occur in the records; ``chosen`` picks one value of a group."""
+    """Return a table with one row per group of joints, and the columns that occur in any of the records.
+
+    Args:
+        columns: Column title, key of the records, and function from the chosen value to its text.
+        groups: Names and records of each group, as from ``by_shape``.
+        chosen: Function of the key and all values of a group, which returns the value to write.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text); a missing value is "–".
+    """
     present = [column for column in columns if any(column[1] in joint for _, group in groups for joint in group)]
     rows = [[" ".join(names), *(_text(column, group, chosen) for column in present)] for names, group in groups]
     return {"head": ["joints", *(head for head, _, _ in present)], "rows": rows}

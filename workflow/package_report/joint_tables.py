@@ -6,7 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from reflowshock.fem.output.ranking import ENDS, OUTER_FIBRE, PEEL, PLASTIC_WORK, VON_MISES, ranked, ranking_measure
+from reflowshock.fem.output.ranking import (
+    ENDS,
+    OUTER_FIBRE,
+    PEEL,
+    PLASTIC_WORK,
+    VON_MISES,
+    rank_joints,
+    ranking_measure,
+)
 from reflowshock.workflow.case.text import mega, micro, nano, number, percent
 from reflowshock.workflow.package_report.joint_records import Column, Record, by_shape, record_table
 from reflowshock.workflow.process.products import read_json
@@ -42,12 +50,26 @@ SHAPE_COLUMNS: tuple[Column, ...] = (
 
 
 def shapes(joints: Sequence[Record]) -> dict:
-    """Return the table of distinct joint shapes, by increasing standoff."""
+    """Return the table of distinct joint shapes, by increasing standoff.
+
+    Args:
+        joints: Records of the joints, see ``joint_records``.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per shape.
+    """
     return record_table(SHAPE_COLUMNS, by_shape(joints), lambda key, values: values[0])
 
 
 def verdicts(run_folder: Path) -> dict:
-    """Return the table of reflow verdicts, joints that are not ok first."""
+    """Return the table of reflow verdicts, joints that are not ok first.
+
+    Args:
+        run_folder: Run folder, of which ``reflow/joints.json`` is read.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per joint.
+    """
     joints = read_json(run_folder / "reflow/joints.json")
     rows = [
         [
@@ -71,15 +93,19 @@ def ranked_joints(
     """Return the table of joints ranked by peel stress, or by plastic work if the solder yields.
 
     Args:
-        history: History of one mode.
+        history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity
+            with one column per joint.
         joints: Records of the joints, see ``joint_records``.
-        judged: Verdict and margin of each joint.
+        judged: Name of a joint -> record with ``verdict``, ``margin`` (None without a limit) and ``criterion``.
         fine: Names of the fine joints; None if all are fine.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per joint, the most stressed first.
     """
     shape = {joint["name"]: joint for joint in joints}
     measure = ranking_measure(history)
     rows = []
-    for column in ranked(history):
+    for column in rank_joints(history):
         name = str(history["joints"][column])
         forces = np.stack([history[f"section_{end}"][:, column] for end in ENDS])
         row = int(np.argmax(PEEL.worse(history)[:, column]))
@@ -123,28 +149,52 @@ def ranked_joints(
 
 
 def work_cells(history: Mapping[str, np.ndarray], column: int) -> list[str]:
-    """Return the plastic work at the worse pad of a joint, as a list of one cell; empty if the solder is elastic."""
+    """Return the plastic work at the worse pad of a joint, as a list of one cell; empty if the solder is elastic.
+
+    Args:
+        history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity.
+        column: Column of the joint in the history.
+    """
     if "plastic_work_board" not in history:
         return []
     return [number(1e-3 * float(PLASTIC_WORK.peaks(history)[column]))]
 
 
 def verdict_cells(judged: Mapping[str, Any]) -> list[str]:
-    """Return verdict and smallest margin of a joint, with its criterion."""
+    """Return verdict and smallest margin of a joint, with its criterion, as two texts.
+
+    Args:
+        judged: Record with ``verdict``, ``margin`` (None without a limit) and ``criterion``.
+    """
     if judged["margin"] is None:
         return [judged["verdict"], "–"]
     return [judged["verdict"], f"{judged['margin']:.3g} by {BY_NAME[judged['criterion']].words}"]
 
 
 def meshes(joints: Sequence[Record]) -> dict | None:
-    """Return the table of mesh quality, the worst of each shape; None before the joints are meshed."""
+    """Return the table of mesh quality, the worst of each shape; None before the joints are meshed.
+
+    Args:
+        joints: Records of the joints, see ``joint_records``.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per shape; None before the joints are
+        meshed.
+    """
     if not any("minimum_scaled_jacobian" in joint for joint in joints):
         return None
     return record_table(MESH_COLUMNS, by_shape([_counted(joint) for joint in joints]), _worst)
 
 
 def missed_tries(joints: Sequence[Record]) -> dict | None:
-    """Return the table of failed meshing attempts; None if every first attempt succeeded."""
+    """Return the table of failed meshing attempts; None if every first attempt succeeded.
+
+    Args:
+        joints: Records of the joints, see ``joint_records``; ``tries`` lists the failed attempts.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per attempt; None without failed ones.
+    """
     rows = [
         [joint["name"], attempt["method"], attempt["missed"]] for joint in joints for attempt in joint.get("tries", ())
     ]
@@ -152,7 +202,14 @@ def missed_tries(joints: Sequence[Record]) -> dict | None:
 
 
 def fine_instead(run_folder: Path) -> dict | None:
-    """Return the table of joints that stay fine because a coarse mesh cannot follow their shape; None without any."""
+    """Return the table of joints that stay fine because a coarse mesh cannot follow their shape; None without any.
+
+    Args:
+        run_folder: Run folder, of which ``solder_mesh/coarse_quality.json`` is read if it exists.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text): joint and reason; None without such joints.
+    """
     path = run_folder / "solder_mesh/coarse_quality.json"
     coarse = read_json(path) if path.exists() else {}
     rows = [[name, joint["fine_instead"]] for name, joint in coarse.items() if "fine_instead" in joint]

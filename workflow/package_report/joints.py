@@ -13,7 +13,13 @@ BRIDGE_CAPTION = "bridged: particles and free surface; the last frame is coloure
 
 
 def add_joints(run_folder: Path, context: dict) -> None:
-    """Add shapes, maps, verdicts and meshes of all joints, as far as the run has gone."""
+    """Add shapes, maps, verdicts and meshes of all joints, as far as the run has gone.
+
+    Args:
+        run_folder: Run folder; without ``reflow/joints.json`` nothing is added.
+        context: Context of the page's template, changed in place: ``headline``, ``tables``, ``maps``, ``scenes``,
+            ``curves``, ``warpage``.
+    """
     if not (run_folder / "reflow/joints.json").exists():
         return
     from reflowshock.workflow.package_report.array import array_maps, shapes_scene
@@ -37,7 +43,11 @@ def add_joints(run_folder: Path, context: dict) -> None:
 
 
 def headline(joints: Sequence[Mapping[str, Any]]) -> list[dict]:
-    """Return the figures of the joints at the top of the page."""
+    """Return the figures of the joints at the top of the page: records with ``value`` and ``label`` as text.
+
+    Args:
+        joints: Records of the joints, see ``joint_records``.
+    """
     standoffs = sorted({f"{1e6 * joint['standoff']:.0f}" for joint in joints}, key=float)
     shapes = len({joint["shape"] for joint in joints})
     return [

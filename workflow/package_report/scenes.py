@@ -25,9 +25,9 @@ def drop_scene(folder: Path, history: Arrays, result: Mapping[str, Any]) -> tupl
     """Return joints, board and package at all stored times of a shock, and a caption.
 
     Args:
-        folder: Folder of the mode.
-        history: History of the mode.
-        result: ``result.json`` of the mode.
+        folder: Folder of the mode, whose field files are read.
+        history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity.
+        result: Content of ``result.json`` of the mode.
     """
     stress = VON_MISES.worse(history)
     critical = stress[:, critical_joint(history)]
@@ -42,7 +42,13 @@ def drop_scene(folder: Path, history: Arrays, result: Mapping[str, Any]) -> tupl
 
 
 def residual_scene(path: Path, parts: Sequence[str], top: float) -> Scene:
-    """Return the residual stress before the shock on a colour scale up to ``top`` [Pa]."""
+    """Return the residual stress before the shock on a colour scale up to ``top``.
+
+    Args:
+        path: Field file ``residual.vtu``.
+        parts: Names of the parts of the mesh, in the order of their numbers in the file.
+        top: Largest stress of the colour scale [Pa].
+    """
     import meshio
 
     mesh = meshio.read(path)

@@ -19,7 +19,13 @@ MOST_JOINTS = 30  # joints of the chart, the critical one first
 
 
 def in_words(real: Arrays, identical: Arrays) -> str:
-    """Return a sentence on how the real shapes change the peel stress of the critical joint."""
+    """Return a sentence on how the real shapes change the peel stress of the critical joint.
+
+    Args:
+        real: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity, of
+            the shock with real joints.
+        identical: The same arrays of the shock with identical joints.
+    """
     peaks, identical_peaks = peel_peaks(real), peel_peaks(identical)
     critical, other = next(iter(peaks)), next(iter(identical_peaks))
     effect = shape_effect(peaks[critical], identical_peaks[critical])
@@ -34,7 +40,17 @@ def in_words(real: Arrays, identical: Arrays) -> str:
 
 
 def table(real: Arrays, identical: Arrays, joints: Sequence[Mapping]) -> dict:
-    """Return the table of peak peel stress with real and with identical joints, the critical joint first."""
+    """Return the table of peak peel stress with real and with identical joints, the critical joint first.
+
+    Args:
+        real: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity, of
+            the shock with real joints.
+        identical: The same arrays of the shock with identical joints.
+        joints: Records with ``name`` and ``standoff`` [m], see ``joint_records``.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per joint.
+    """
     peaks, identical_peaks = peel_peaks(real), peel_peaks(identical)
     standoff = {joint["name"]: joint["standoff"] for joint in joints}
     rows = []
@@ -49,7 +65,13 @@ def table(real: Arrays, identical: Arrays, joints: Sequence[Mapping]) -> dict:
 
 
 def curves(real: Arrays, identical: Arrays) -> list[Chart]:
-    """Return charts of the critical joint's peel stress and of the peaks of all joints, real and identical."""
+    """Return charts of the critical joint's peel stress and of the peaks of all joints, real and identical.
+
+    Args:
+        real: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity, of
+            the shock with real joints.
+        identical: The same arrays of the shock with identical joints.
+    """
     peaks, identical_peaks = peel_peaks(real), peel_peaks(identical)
     critical, names = next(iter(peaks)), list(peaks)[:MOST_JOINTS]
     kinds = ((real, peaks, "real shapes", BLUE), (identical, identical_peaks, "identical joints", ORANGE))

@@ -23,7 +23,14 @@ SIDES = ("von_mises_board", "von_mises_package")
 
 
 def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dict) -> None:
-    """Add the sections on the shock to the context of a report, if the shock was run."""
+    """Add the sections on the shock to the context of a report, if the shock was run.
+
+    Args:
+        run_folder: Run folder; without the product of the shock nothing is added.
+        case: Case of the run.
+        context: Context of the page's template, changed in place.
+        summary: Content of ``summary.json``.
+    """
     shock = run_folder / "shock"
     histories, results = read_modes(shock)
     if not histories:
@@ -72,7 +79,12 @@ def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dic
 
 
 def kinematics_note(metrics: dict, kinematics: str) -> str:
-    """Return a note on the strain that small kinematics neglect; empty where it is negligible."""
+    """Return a note on the strain that small kinematics neglect; empty where it is negligible.
+
+    Args:
+        metrics: Name -> record with ``value`` (SI) and ``unit``.
+        kinematics: Kinematics of the run, "small" or "finite".
+    """
     from reflowshock.fem.problem.kinematics import NEGLIGIBLE_STRAIN
 
     neglected = metrics.get("peak_neglected_strain", {}).get("value", 0.0)
@@ -88,14 +100,25 @@ def kinematics_note(metrics: dict, kinematics: str) -> str:
 
 
 def ranking_mode(histories: dict, results: dict) -> str:
-    """Return the mode in which all joints are fine, unless that ended early."""
+    """Return the mode whose history ranks the joints: the one with all joints fine, unless it ended early.
+
+    Args:
+        histories: Mode -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity, the
+            main mode first.
+        results: Mode -> content of its ``result.json`` (``model``, ``metrics``, ``health``, ``timings``, ``coupling``).
+    """
     main = next(iter(histories))
     is_whole = "dns" in results and len(histories["dns"]["time"]) == len(histories[main]["time"])
     return "dns" if is_whole and findings.fine_joints_of(results[main]) else main
 
 
 def joint_order(history: dict, mode: str) -> str:
-    """Return how the joints are sorted, naming the mode of their history unless it is the main one (empty)."""
+    """Return a sentence on how the joints are sorted.
+
+    Args:
+        history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity.
+        mode: Mode of the history, which the sentence names; empty for the main mode, which is not named.
+    """
     remark = f" (from the {tables.mode_name(mode)}, in which all joints are fine)" if mode else ""
     return f"Largest {ranking_measure(history).name} first{remark}"
 
@@ -114,7 +137,12 @@ def _add_shape_effect(shock: Path, history: dict, joints: list[dict], context: d
 
 
 def standoff_sentence(metrics: Mapping[str, Any]) -> str:
-    """Return a sentence with the standoff of the critical joint and of the identical joints."""
+    """Return a sentence with the standoff of the critical joint and of the identical joints.
+
+    Args:
+        metrics: Name -> record with ``value`` (SI) and ``unit``; ``critical_joint_standoff`` and
+            ``identical_joint_standoff`` are read [m].
+    """
     critical, identical = (micro(metrics[f"{name}_joint_standoff"]["value"]) for name in ("critical", "identical"))
     return f" Its standoff is {critical} µm; identical joints have {identical} µm."
 
@@ -154,9 +182,9 @@ def add_residual(shock: Path, parts: list[str], context: dict) -> None:
     """Add the residual stress of cooling, if the shock starts with it.
 
     Args:
-        shock: Folder of the shock.
-        parts: Names of the parts of its mesh.
-        context: Context of the report.
+        shock: Folder of the shock, from which the first cooling is read; without one nothing is added.
+        parts: Names of the parts of its mesh, in order.
+        context: Context of the page's template, changed in place: ``residual``, ``tables``, ``scenes``.
     """
     from reflowshock.workflow.package_report.scenes import residual_scene
 
@@ -172,7 +200,11 @@ def add_residual(shock: Path, parts: list[str], context: dict) -> None:
 
 
 def in_words(metrics: Mapping[str, Any]) -> str:
-    """Return sentences on the residual stress of the joints and the change of the package's warpage."""
+    """Return sentences on the residual stress of the joints and the change of the package's warpage.
+
+    Args:
+        metrics: Name -> record with ``value`` (SI) and ``unit``, from ``result.json`` of the cooling.
+    """
     warpages = (metrics[name]["value"] for name in ("solidified_warpage", "room_temperature_warpage"))
     hot, cold = (f"{micro(warpage)} µm" for warpage in warpages)
     text = f"Cooling from solidification changes the warpage of the package from {hot} to {cold}"
@@ -183,7 +215,15 @@ def in_words(metrics: Mapping[str, Any]) -> str:
 
 
 def table(joints: Mapping[str, list]) -> dict:
-    """Return the table of residual stress of every joint before the shock, the largest first."""
+    """Return the table of residual stress of every joint before the shock, the largest first.
+
+    Args:
+        joints: Entry ``joints`` of the cooling's ``result.json``: names in ``joints`` and, in the same order, lists of
+            stresses [Pa] such as ``von_mises_board``, and optionally ``plastic_strain_max``.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per joint.
+    """
     columns = [joints[name] for name in (*SIDES, "von_mises_max")]
     strains = joints.get("plastic_strain_max")
     heads = ["board pad [MPa]", "package pad [MPa]", "largest element value [MPa]"]

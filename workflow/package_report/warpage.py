@@ -68,7 +68,11 @@ def faces(structure: Mapping[str, NDArray]) -> tuple[Face, Face]:
     """Return the underside of the package and the top face of the board below it.
 
     Args:
-        structure: Arrays of ``reflow/structure.npz``.
+        structure: Arrays of ``reflow/structure.npz`` (``points``, ``displacement``, ``package``, ``temperature``,
+            ``pad_motion``, …).
+
+    Returns:
+        Both faces with their nodes, shape (n, 3), and lifts, shape (n,) [m].
     """
     points, displacement, package = (structure[name] for name in ("points", "displacement", "package"))
     under = package & (points[:, 2] <= points[package, 2].min() + SAME_HEIGHT)
@@ -78,7 +82,13 @@ def faces(structure: Mapping[str, NDArray]) -> tuple[Face, Face]:
 
 
 def warpage_scene(structure: Mapping[str, NDArray], joints: Sequence[Mapping[str, Any]]) -> Scene:
-    """Return both faces with their lift relative to the centre, and the positions of the joints between them."""
+    """Return both faces with their lift relative to the centre, and the positions of the joints between them.
+
+    Args:
+        structure: Arrays of ``reflow/structure.npz`` (``points``, ``displacement``, ``package``, ``temperature``,
+            ``pad_motion``, …).
+        joints: Records with ``x``, ``y`` [m] and, optionally, ``name``.
+    """
     warped = faces(structure)
     largest = max(float(np.abs(face.over_centre).max()) for face in warped)
     groups = []
@@ -103,7 +113,12 @@ def warpage_scene(structure: Mapping[str, NDArray], joints: Sequence[Mapping[str
 
 
 def profiles(structure: Mapping[str, NDArray]) -> list[Chart]:
-    """Return charts of the lift along the package diagonal, and of the joint gaps over temperature."""
+    """Return charts of the lift along the package diagonal, and of the joint gaps over temperature.
+
+    Args:
+        structure: Arrays of ``reflow/structure.npz`` (``points``, ``displacement``, ``package``, ``temperature``,
+            ``pad_motion``, …).
+    """
     package, board = faces(structure)
     x, y, along = _diagonal(package)
     lines = []
@@ -125,7 +140,15 @@ def profiles(structure: Mapping[str, NDArray]) -> list[Chart]:
 
 
 def load_steps(structure: Mapping[str, NDArray]) -> dict:
-    """Return the table of load steps: temperature, corner motion, gaps, iterations, residuals."""
+    """Return the table of load steps: temperature, corner motion, gaps, iterations, residuals.
+
+    Args:
+        structure: Arrays of ``reflow/structure.npz`` (``points``, ``displacement``, ``package``, ``temperature``,
+            ``pad_motion``, …).
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per load step.
+    """
     columns = [
         ("temperature [°C]", structure["temperature"] - KELVIN, ".1f"),
         ("corner motion [µm]", structure["corner_displacement"] / MICRO, "+.2f"),
@@ -143,7 +166,12 @@ def load_steps(structure: Mapping[str, NDArray]) -> dict:
 
 
 def in_words(structure: Mapping[str, NDArray]) -> str:
-    """Return a sentence on the warpage of package and board and the change of the gaps at solidification."""
+    """Return a sentence on the warpage of package and board and the change of the gaps at solidification.
+
+    Args:
+        structure: Arrays of ``reflow/structure.npz`` (``points``, ``displacement``, ``package``, ``temperature``,
+            ``pad_motion``, …).
+    """
     package, board = faces(structure)
     gaps = relative_lift(structure)[-1] / MICRO
     above, below = package.warpage / MICRO, board.warpage / MICRO
@@ -155,13 +183,30 @@ def in_words(structure: Mapping[str, NDArray]) -> str:
 
 
 def relative_lift(structure: Mapping[str, NDArray]) -> Floats:
-    """Return the change of the gap of each joint, shape (steps, joints) [m]."""
+    """Return the change of the gap of each joint: lift of its package pad minus lift of its board pad.
+
+    Args:
+        structure: Arrays of ``reflow/structure.npz`` (``points``, ``displacement``, ``package``, ``temperature``,
+            ``pad_motion``, …); ``pad_motion`` has shape (steps, joints, 2, 6), board pad first.
+
+    Returns:
+        Change of the gap from the drawing, shape (steps, joints) [m].
+    """
     motion = structure["pad_motion"]
     return motion[:, :, 1, 2] - motion[:, :, 0, 2]
 
 
 def read_structure(run_folder: Path) -> dict[str, NDArray] | None:
-    """Return the arrays of ``reflow/structure.npz``; None if the reflow had no structure."""
+    """Return the arrays of ``reflow/structure.npz``; None if the reflow had no structure.
+
+    Args:
+        run_folder: Run folder with the product of the reflow.
+
+    Returns:
+        Arrays by name: ``points`` and ``displacement``, shape (n, 3) [m]; ``package``, mask of its nodes;
+        ``temperature``, shape (steps,) [K]; ``pad_motion``, shape (steps, joints, 2, 6); residuals per step. None if
+        there is no file.
+    """
     path = run_folder / "reflow/structure.npz"
     if not path.exists():
         return None

@@ -16,7 +16,7 @@ from rich.console import Console
 
 from reflowshock.problem import Problem
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.case.plausible import FORCE, implausible, implausible_tables
+from reflowshock.workflow.case.plausible import FORCE, find_implausible, implausible_tables
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.case.toml_file import fault_of
@@ -40,7 +40,11 @@ class Leave:
 
 
 def problems_of(case: Case, leave: Leave) -> list[Problem]:
-    """Return the problems of a case whose individual values are valid; the cheapest checks run first."""
+    """Return the problems of a case whose individual values are valid; the cheapest checks run first.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
+    """
     with np.errstate(all="ignore"):
         try:
             return _values(case, leave) or kind_of(case).problems(case) or list(too_large(case, leave))
@@ -53,13 +57,17 @@ def problems_of(case: Case, leave: Leave) -> list[Problem]:
 def _values(case: Case, leave: Leave) -> list[Problem]:
     """Return problems with the number of ranks, implausible values and tables, and unreadable files."""
     problems = [] if leave.oversubscribe else list(too_many_ranks(case))
-    problems += [] if leave.force else list(implausible(case))
+    problems += [] if leave.force else list(find_implausible(case))
     problems += unreadable_files(case)
     return problems if problems or leave.force else list(implausible_tables(case))
 
 
 def unreadable_files(case: Case) -> Iterator[Problem]:
-    """Yield a problem for each input file that is missing, unreadable or too large."""
+    """Yield a problem for each input file that is missing, unreadable or too large.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     for key, path in case.files.items():
         fault = fault_of(path, LARGEST_FILE)
         if fault:
@@ -67,7 +75,11 @@ def unreadable_files(case: Case) -> Iterator[Problem]:
 
 
 def too_many_ranks(case: Case) -> Iterator[Problem]:
-    """Yield a problem for each key that requests more MPI ranks than this machine has cores."""
+    """Yield a problem for each key that requests more MPI ranks than this machine has cores.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     cores = available_cores()
     for key, ranks in case.ranks_by_key.items():
         if ranks > cores:
@@ -76,7 +88,11 @@ def too_many_ranks(case: Case) -> Iterator[Problem]:
 
 
 def too_large(case: Case, leave: Leave | None = None) -> Iterator[Problem]:
-    """Yield a problem if a case needs more memory than this machine has (than any machine, if oversubscribed)."""
+    """Yield a problem if a case needs more memory than this machine has (than any machine, if oversubscribed).
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     needed, leave = needed_memory(case), leave or Leave()
     if leave.force:
         return
@@ -107,16 +123,16 @@ def ask_if_long(name: str, seconds: float, yes: bool, console: Console) -> bool:
     """Ask the user to confirm a long run.
 
     Args:
-        name: name of the run.
-        seconds: predicted wall time [s].
-        yes: whether the user has already agreed.
-        console: console for the question.
+        name: Name of the run.
+        seconds: Predicted wall time [s].
+        yes: Whether the user has already agreed.
+        console: Console for the question.
 
     Returns:
         Whether the run may start.
 
     Raises:
-        CaseError: the console is not interactive.
+        CaseError: The console is not interactive.
     """
     if yes or seconds <= LONG:
         return True

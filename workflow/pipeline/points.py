@@ -41,9 +41,9 @@ def read_possible_points(
 
     Args:
         case: TOML file.
-        settings: for each point, values as text by dotted key.
-        oversubscribe: whether more MPI ranks than cores are allowed.
-        force: whether implausible values are allowed.
+        settings: For each point, values as text by dotted key.
+        oversubscribe: Whether more MPI ranks than cores are allowed.
+        force: Whether implausible values are allowed.
 
     Returns:
         The valid points, and the errors of the others by index in ``settings``.
@@ -72,7 +72,7 @@ def read_case_of_run(folder: Path) -> Case:
     """Return the case of a run folder.
 
     Raises:
-        CaseError: the folder is not a run folder, or its case is damaged.
+        CaseError: The folder is not a run folder, or its case is damaged.
     """
     table = read_case_table(folder)
     try:

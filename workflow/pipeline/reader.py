@@ -27,15 +27,15 @@ def read_case(path: Path, overrides: Sequence[str] = (), oversubscribe: bool = F
         path: TOML file.
         overrides: "dotted.key=value" settings that override the file and its scale; values are TOML, quotes may be
             omitted.
-        oversubscribe: whether more MPI ranks than cores and more memory than this machine has are allowed, e.g. for
+        oversubscribe: Whether more MPI ranks than cores and more memory than this machine has are allowed, e.g. for
             cases that run elsewhere.
-        force: whether implausible values are allowed.
+        force: Whether implausible values are allowed.
 
     Returns:
         The case, every value checked.
 
     Raises:
-        CaseError: with all problems and their positions: syntax, names, units, ranges, impossible geometry, unreadable
+        CaseError: With all problems and their positions: syntax, names, units, ranges, impossible geometry, unreadable
             files, too large models.
     """
     text = read_text(path)

@@ -24,9 +24,9 @@ def write_report(run_folder: Path, case: Case, folder: Path) -> dict:
     """Write ``report.html`` and ``summary.json``.
 
     Args:
-        run_folder: folder of the run; stages without a product are omitted from the page.
-        case: the resolved case.
-        folder: output folder.
+        run_folder: Folder of the run; stages without a product are omitted from the page.
+        case: The resolved case.
+        folder: Output folder.
 
     Returns:
         The summary.
@@ -89,8 +89,8 @@ def collect_summary(run_folder: Path, case: Case) -> dict:
     """Merge the records of a run's stages.
 
     Args:
-        run_folder: folder of the run.
-        case: the resolved case.
+        run_folder: Folder of the run.
+        case: The resolved case.
 
     Returns:
         The contents of ``summary.json``: case, version, inputs_sha256, metrics, timings [s], effects, health.

@@ -19,9 +19,9 @@ class Resources:
 
     Attributes:
         tasks: MPI ranks.
-        cpus_per_task: cores per rank.
-        mem_mb: memory on each node [MB].
-        runtime: walltime [min].
+        cpus_per_task: Cores per rank.
+        mem_mb: Memory on each node [MB].
+        runtime: Walltime [min].
     """
 
     tasks: int
@@ -33,7 +33,7 @@ class Resources:
         """Return the resources under the names of Snakemake.
 
         Args:
-            launcher: command that starts MPI ranks.
+            launcher: Command that starts MPI ranks.
         """
         mpi = {"mpi": launcher} if self.tasks > 1 else {}
         return {
@@ -49,9 +49,9 @@ def stage_resources(case: Case, walltime_factor: float = 1.0, cores: int = MOST_
     """Predict the resources of the jobs of a case.
 
     Args:
-        case: the case.
-        walltime_factor: factor on the wall time.
-        cores: number of cores of the largest node.
+        case: The case.
+        walltime_factor: Factor on the wall time.
+        cores: Number of cores of the largest node.
 
     Returns:
         Resources by name of the stage, for stages that are jobs.

@@ -21,17 +21,17 @@ def run_stage(name: str, function: StageFunction, run: Run, product: Path) -> di
     """Run a stage; its complete product is published atomically.
 
     Args:
-        name: name of the stage.
-        function: stage function, which writes products into a folder and returns findings.
-        run: input of the stage.
-        product: folder of the product; an existing one is replaced.
+        name: Name of the stage.
+        function: Stage function, which writes products into a folder and returns findings.
+        run: Input of the stage.
+        product: Folder of the product; an existing one is replaced.
 
     Returns:
         The record: seconds, core_seconds, forecast, machine, metrics, health, effects, continued, key, inputs, reads,
         files.
 
     Raises:
-        StageError: an input file has changed since the start of the command, or a product is missing.
+        StageError: An input file has changed since the start of the command, or a product is missing.
     """
     stage, partial = run.case.pipeline[name], run.folder / f".{name}.partial"
     before = {"inputs": stage_inputs(run.case, stage), "reads": _reads(run, stage)}

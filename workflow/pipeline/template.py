@@ -9,7 +9,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
 from reflowshock.materials.roles import ByName
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 from reflowshock.problem import Problem, as_toml
 from reflowshock.workflow.case.case import CASES, Case, Title
 from reflowshock.workflow.case.fields import (
@@ -47,19 +47,19 @@ def write_new_case(name: str, template: str, folder: Path = Path()) -> Path:
     """Write ``<folder>/<name>.toml``, complete and commented.
 
     Args:
-        name: name of the case.
-        template: name of the shipped case to copy.
-        folder: output folder.
+        name: Name of the case.
+        template: Name of the shipped case to copy.
+        folder: Output folder.
 
     Returns:
         The path of the file.
 
     Raises:
-        CaseError: the name is invalid, the template does not exist, or the file exists already.
+        CaseError: The name is invalid, the template does not exist, or the file exists already.
     """
     cases = templates()
     if template not in cases:
-        choice, hint = "one of " + ", ".join(cases), nearest(template, cases)
+        choice, hint = "one of " + ", ".join(cases), find_nearest(template, cases)
         raise CaseError("new", [Problem("--template", "unknown template", template, choice, hint)])
     if not is_name(name):
         raise CaseError("new", [wrong_name("NAME", name)])

@@ -21,7 +21,7 @@ from reflowshock.workflow.process.kernel_folder import choose_kernel_folder
 UTF8 = "PYTHONUTF8"
 OUTPUT_ENCODING = "PYTHONIOENCODING"
 ESCAPES = "backslashreplace"  # characters missing in an encoding are written as escapes
-# Variables with the number of ranks and the own rank: Open MPI, then MPICH and Slurm's PMI.
+# Variables with the number of ranks and the rank of this process: Open MPI, then MPICH and Slurm's PMI.
 RANKS = (("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_RANK"), ("PMI_SIZE", "PMI_RANK"))
 # Variables of user folders, and the default subfolders of the home.
 USER_FOLDERS = {
@@ -64,15 +64,15 @@ def prepare() -> None:
     """Complete the environment of this process; heavy libraries must not be loaded yet.
 
     Raises:
-        EnvironmentProblem: the environment is unsuitable.
+        EnvironmentProblem: The environment is unsuitable.
     """
     check_ranks(os.environ)
     check_limits()
-    write_any_text()
+    escape_unencodable()
     complete(os.environ)
 
 
-def begin_again_in_utf8() -> None:
+def restart_in_utf8() -> None:
     """Restart this process in Python's UTF-8 mode if the locale has another encoding.
 
     File names, arguments and texts are then independent of the locale. Only the terminal keeps its encoding.
@@ -85,7 +85,7 @@ def begin_again_in_utf8() -> None:
     os.execv(sys.executable, [sys.executable, *sys.orig_argv[1:]])
 
 
-def write_any_text() -> None:
+def escape_unencodable() -> None:
     """Make standard output and error write characters missing in their encoding as escapes."""
     for stream in (sys.stdout, sys.stderr):
         reconfigure = getattr(stream, "reconfigure", None)
@@ -97,7 +97,7 @@ def complete(environment: MutableMapping[str, str]) -> None:
     """Complete an environment for this process and its children; repeated calls change nothing.
 
     Raises:
-        EnvironmentProblem: no folder for temporary files is writable.
+        EnvironmentProblem: No folder for temporary files is writable.
     """
     cleaned = without_mpi_job(environment)
     for name in set(environment) - set(cleaned):
@@ -116,7 +116,7 @@ def check_ranks(environment: Mapping[str, str]) -> None:
     """Raise if the command was started on several MPI ranks, each of which would do all the work.
 
     Raises:
-        EnvironmentProblem: there are several ranks. The first rank prints the message while the others wait, because
+        EnvironmentProblem: There are several ranks. The first rank prints the message while the others wait, because
             Open MPI 5 ends all ranks as soon as one has failed.
     """
     for size, rank in RANKS:
@@ -133,7 +133,7 @@ def check_limits() -> None:
     """Raise if a limit of the shell is too small, since libraries would fail without a clear message.
 
     Raises:
-        EnvironmentProblem: a limit is too small.
+        EnvironmentProblem: A limit is too small.
     """
     for number, least, message in MINIMUM_LIMITS:
         soft, _ = resource.getrlimit(number)
@@ -153,8 +153,8 @@ def check_limits() -> None:
 
 def _can_start(count: int) -> bool:
     """Return whether a number of threads can be started in addition to the user's processes, by trying it."""
-    over = threading.Event()
-    threads = [threading.Thread(target=over.wait) for _ in range(count)]
+    release = threading.Event()
+    threads = [threading.Thread(target=release.wait) for _ in range(count)]
     started = []
     try:
         for thread in threads:
@@ -163,7 +163,7 @@ def _can_start(count: int) -> bool:
     except RuntimeError:
         return False
     finally:
-        over.set()
+        release.set()
         for thread in started:
             thread.join()
     return True
@@ -176,7 +176,7 @@ def set_writable_folders(environment: MutableMapping[str, str]) -> None:
         environment: Variables to correct. A readable HOME and writable TMPDIR, MPLCONFIGDIR and ``USER_FOLDERS`` stay.
 
     Raises:
-        EnvironmentProblem: no folder for temporary files is writable.
+        EnvironmentProblem: No folder for temporary files is writable.
     """
     temporary = temporary_folder(environment)
     home = environment.get("HOME") or _home_of_user()
@@ -198,7 +198,7 @@ def temporary_folder(environment: MutableMapping[str, str]) -> Path:
     """Return a writable folder for temporary files and set TMPDIR if children would choose another one.
 
     Raises:
-        EnvironmentProblem: no folder is writable.
+        EnvironmentProblem: No folder is writable.
     """
     named = [environment[name] for name in ("TMPDIR", "TEMP", "TMP") if environment.get(name)]
     candidates = [*named, *TEMPORARY]

@@ -10,7 +10,7 @@ from reflowshock.workflow.case.run import Run
 from reflowshock.workflow.process.launch import PATIENCE, launch, mpi_command
 from reflowshock.workflow.process.terminal import progress_bar
 
-AFTER_THE_RANKS = 10.0  # [s]
+WATCHDOG_MARGIN = 10.0  # [s]
 
 logger = logging.getLogger(__name__)
 
@@ -19,13 +19,13 @@ def run_fem(run: Run, folder: Path, request: dict, title: str) -> None:
     """Run the package fem on the MPI ranks of the case, showing its progress.
 
     Args:
-        run: case and cores.
-        folder: folder of the products, created here.
-        request: contents of the input file except ``output``.
-        title: title of the progress bar.
+        run: Case and cores.
+        folder: Folder of the products, created here.
+        request: Contents of the input file except ``output``.
+        title: Title of the progress bar.
 
     Raises:
-        LaunchError: the run failed; the message contains its last output.
+        LaunchError: The run failed; the message contains its last output.
     """
     folder.mkdir()
     path = folder / "input.json"
@@ -33,16 +33,16 @@ def run_fem(run: Run, folder: Path, request: dict, title: str) -> None:
     ranks = run.case.ranks
     command = mpi_command(ranks, [sys.executable, "-m", "reflowshock.fem", str(path)], run.oversubscribe)
     with progress_bar(f"{title} on {ranks} rank{'s' if ranks > 1 else ''}") as progress:
-        launch(command, lambda line: _pass_on(line, progress), folder / "log.txt", _patience(request))
+        launch(command, lambda line: _handle_line(line, progress), folder / "log.txt", _patience(request))
 
 
 def _patience(request: dict) -> float:
     """Return how long a rank may be stopped [s]: slightly longer than the ranks' own watchdog, which reports more."""
     model = request.get("shock") or request.get("dynamics") or {}
-    return float(model.get("numerics", {}).get("watchdog_seconds", PATIENCE)) + AFTER_THE_RANKS
+    return float(model.get("numerics", {}).get("watchdog_seconds", PATIENCE)) + WATCHDOG_MARGIN
 
 
-def _pass_on(line: str, progress: Callable[[float], None]) -> None:
+def _handle_line(line: str, progress: Callable[[float], None]) -> None:
     """Show the progress or the warning in a line of output."""
     if line.startswith('{"progress"'):
         progress(json.loads(line)["progress"])

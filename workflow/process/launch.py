@@ -50,7 +50,7 @@ class StoppedProcesses:
         checks: dict[int, int] = {}
         tick = min(TICK, self._patience / 4)
         while not self._over.wait(tick):
-            checks = {process: checks.get(process, 0) + 1 for process in stopped(self._process)}
+            checks = {process: checks.get(process, 0) + 1 for process in find_stopped(self._process)}
             late = [process for process, count in checks.items() if count * tick > self._patience]
             if late:
                 names = " and ".join(name(process) for process in late)
@@ -60,7 +60,7 @@ class StoppedProcesses:
                         os.kill(process, signal.SIGKILL)
 
 
-def stopped(root: int) -> list[int]:
+def find_stopped(root: int) -> list[int]:
     """Return the stopped processes among a process and its descendants."""
     parents: dict[int, int] = {}
     halted = []
@@ -68,10 +68,10 @@ def stopped(root: int) -> list[int]:
         if not folder.name.isdigit():
             continue
         try:
-            said = (folder / "stat").read_text(encoding="utf-8", errors="replace")
+            status = (folder / "stat").read_text(encoding="utf-8", errors="replace")
         except OSError:  # it has ended meanwhile
             continue
-        state, parent = said.rpartition(")")[2].split()[:2]
+        state, parent = status.rpartition(")")[2].split()[:2]
         parents[int(folder.name)] = int(parent)
         if state == STOPPED:
             halted.append(int(folder.name))
@@ -128,9 +128,9 @@ def mpi_command(ranks: int, program: Sequence[str], oversubscribe: bool) -> list
     """Return the command that starts a program on MPI ranks, with Open MPI or the launcher in ``LAUNCHER``.
 
     Args:
-        ranks: number of MPI ranks.
-        program: program and arguments.
-        oversubscribe: whether there may be more ranks than cores.
+        ranks: Number of MPI ranks.
+        program: Program and arguments.
+        oversubscribe: Whether there may be more ranks than cores.
     """
     launcher = shlex.split(os.environ.get(LAUNCHER, "")) or [MPIRUN, *UNBOUND]
     if Path(launcher[0]).name != MPIRUN:
@@ -147,13 +147,13 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path, pa
     """Run a program to its end, reading its standard output line by line.
 
     Args:
-        command: program and arguments.
-        on_line: called with each line of standard output.
-        log: file for standard error; a program may also explain its end in the file ``ERROR`` of the same folder.
-        patience: how long a process may be stopped [s] before the program is ended.
+        command: Program and arguments.
+        on_line: Function that takes each line of standard output.
+        log: File for standard error; a program may also explain its end in the file ``ERROR`` of the same folder.
+        patience: How long a process may be stopped [s] before the program is ended.
 
     Raises:
-        LaunchError: the program is missing, its exit code is not 0, or one of its processes was stopped.
+        LaunchError: The program is missing, its exit code is not 0, or one of its processes was stopped.
     """
     program = command[0]
     if shutil.which(program) is None:
@@ -181,10 +181,10 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path, pa
     if code != 0:
         lines = _read(log) + _read(log.with_name(ERROR))
         words = "\n".join(lines[-LAST_LINES:]) or "it wrote no message"
-        said, words = (without_traceback(text, log) for text in (error_of(lines), words))
+        message, words = (without_traceback(text, log) for text in (error_of(lines), words))
         if watch.message:
-            raise LaunchError(f"{watch.message}; {said}".removesuffix("; "))
-        raise LaunchError(said or f"{program} {ending(code)}: {words}")
+            raise LaunchError(f"{watch.message}; {message}".removesuffix("; "))
+        raise LaunchError(message or f"{program} {ending(code)}: {words}")
 
 
 def _read(path: Path) -> list[str]:
@@ -193,8 +193,8 @@ def _read(path: Path) -> list[str]:
 
 def error_of(lines: Sequence[str]) -> str:
     """Return the message that follows the last ``ERROR_PREFIX`` in the output of a program, or an empty string."""
-    begins = [k for k, line in enumerate(lines) if line.startswith(ERROR_PREFIX)]
-    return "\n".join(lines[begins[-1] :]).removeprefix(ERROR_PREFIX) if begins else ""
+    starts = [k for k, line in enumerate(lines) if line.startswith(ERROR_PREFIX)]
+    return "\n".join(lines[starts[-1] :]).removeprefix(ERROR_PREFIX) if starts else ""
 
 
 def without_traceback(text: str, log: Path) -> str:
@@ -203,8 +203,8 @@ def without_traceback(text: str, log: Path) -> str:
     if not traceback:
         return text
     last = after.strip().splitlines()[-1]
-    what, semicolon, checkpoint = last.partition("; last checkpoint")
-    return f"{before.strip()} {describe_text(what) or what}{semicolon}{checkpoint} (details: {log})".strip()
+    reason, semicolon, checkpoint = last.partition("; last checkpoint")
+    return f"{before.strip()} {describe_text(reason) or reason}{semicolon}{checkpoint} (details: {log})".strip()
 
 
 def ending(code: int) -> str:

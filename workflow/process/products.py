@@ -1,4 +1,4 @@
-"""JSON products."""
+"""Reading and writing of JSON products."""
 
 import json
 from pathlib import Path
@@ -10,5 +10,5 @@ def read_json(path: Path) -> dict:
 
 
 def write_json(path: Path, content: dict | list) -> None:
-    """Write a JSON product, one value a line."""
+    """Write a JSON product with one value per line."""
     path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")

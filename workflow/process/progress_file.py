@@ -18,9 +18,9 @@ class Progress:
     """Progress of a stage.
 
     Attributes:
-        what: current activity.
-        share: completed share, 0 to 1.
-        seconds: time since the start of the activity [s].
+        what: Current activity.
+        share: Completed share, 0 to 1.
+        seconds: Time since the start of the activity [s].
     """
 
     what: str
@@ -33,31 +33,31 @@ class Progress:
         return self.seconds * (1.0 / self.share - 1.0) if self.share > 0.0 else None
 
 
-def tell_in(folder: Path) -> None:
+def write_progress_to(folder: Path) -> None:
     """Write the progress of this process and its children to a folder."""
     os.environ[VARIABLE] = str((folder / NAME).resolve())
 
 
-def teller(what: str) -> Callable[[float, str], None]:
-    """Return a function that writes the progress of an activity starting now; without ``tell_in`` it does nothing.
+def progress_writer(what: str) -> Callable[[float, str], None]:
+    """Return a function of share and text that writes the progress of an activity starting now.
 
-    Write errors (a full device) are ignored.
+    It does nothing before ``write_progress_to`` has set a folder, and ignores write errors (a full device).
     """
-    begin, last = time.time(), [0.0]
+    start, last = time.time(), [0.0]
     path = os.environ.get(VARIABLE)
 
-    def tell(share: float, text: str) -> None:
+    def write(share: float, text: str) -> None:
         now = time.time()
         if path is None or (now - last[0] < INTERVAL and share > 0.0):
             return
         last[0] = now
         partial = Path(f"{path}.partial")
         with suppress(OSError):
-            partial.write_text(json.dumps({"what": text or what, "share": share, "begin": begin}), encoding="utf-8")
+            partial.write_text(json.dumps({"what": text or what, "share": share, "begin": start}), encoding="utf-8")
             partial.replace(path)
 
-    tell(0.0, "")
-    return tell
+    write(0.0, "")
+    return write
 
 
 def read_progress(folder: Path) -> Progress | None:

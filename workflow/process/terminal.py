@@ -16,7 +16,7 @@ from rich.table import Table
 from rich.text import Span, Text
 
 from reflowshock.workflow.case.text import against_limit
-from reflowshock.workflow.process.progress_file import teller
+from reflowshock.workflow.process.progress_file import progress_writer
 
 REFLOW_SPEED = "Costs assume the reflow speed in particles/parameters/estimate.py, as benchmarks/ measured it."
 
@@ -32,12 +32,12 @@ def visible(text: str) -> str:
     return CONTROL.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
-def styled(template: str, *values: object) -> Text:
+def style_text(template: str, *values: object) -> Text:
     """Style a template with markup and insert values, which are never interpreted as markup.
 
     Args:
-        template: constant with markup and one ``{}`` per value, such as ``"[bold]{}[/] in {}"``.
-        values: values in the order of their placeholders.
+        template: Constant with markup and one ``{}`` per value, such as ``"[bold]{}[/] in {}"``.
+        values: Values in the order of their placeholders.
     """
     words = Text.from_markup(template, emoji=False)
     ends = [end for match in re.finditer(re.escape(PLACE), words.plain) for end in match.span()]
@@ -49,7 +49,7 @@ def styled(template: str, *values: object) -> Text:
 
 
 class Terminal(Console):
-    """Console that prints text literally: no markup, no emoji, no colours except those of ``styled``."""
+    """Console that prints text literally: no markup, no emoji, no colours except those of ``style_text``."""
 
     def __init__(self, descriptor: int = 1, **options: Any) -> None:
         """Open standard output (1) or standard error (2); files and pipes receive no control sequences."""
@@ -86,7 +86,7 @@ errors = Terminal(2)
 def print_error(text: str) -> None:
     """Print an error, its first line emphasised."""
     first, _, rest = text.partition("\n")
-    errors.print(styled("[bold red]error:[/] {}", first), soft_wrap=True)
+    errors.print(style_text("[bold red]error:[/] {}", first), soft_wrap=True)
     if rest:
         errors.print(rest, soft_wrap=True)
 
@@ -105,13 +105,13 @@ def health_line(stage: str, seconds: float, health: dict, continued: str = "") -
     """Print the result of a stage: time, failed checks, or otherwise the check closest to its limit.
 
     Args:
-        stage: name of the stage.
-        seconds: wall time of the stage [s].
-        health: value, limit and ok by name of the check.
-        continued: names of parts that continued from checkpoints, or empty.
+        stage: Name of the stage.
+        seconds: Wall time of the stage [s].
+        health: Value, limit and ok by name of the check.
+        continued: Names of parts that continued from checkpoints, or empty.
     """
     failed = [name for name, result in health.items() if not result["ok"]]
-    mark = styled("[bold red]FAILED[/]") if failed else styled("[green]ok[/]    ")
+    mark = style_text("[bold red]FAILED[/]") if failed else style_text("[green]ok[/]    ")
     if failed:
         text = ", ".join(_against_limit(name, health[name]) for name in failed)
     elif health:
@@ -122,7 +122,7 @@ def health_line(stage: str, seconds: float, health: dict, continued: str = "") -
         text = "done"
     if continued:
         text += f"; {continued} continued from checkpoints"
-    line = styled(" [bold]{}[/] {} s  {}", f"{stage:<11}", f"{seconds:6.1f}", text)
+    line = style_text(" [bold]{}[/] {} s  {}", f"{stage:<11}", f"{seconds:6.1f}", text)
     console.print(mark + line, soft_wrap=True)
 
 
@@ -163,13 +163,13 @@ def progress_bar(description: str) -> Iterator[ProgressBar]:
     moving = console.is_terminal and not console.is_dumb_terminal
     if not moving:
         console.print(f"       {description} …", soft_wrap=True)
-    tell = teller(description)
+    write_progress = progress_writer(description)
     with Progress(*columns, console=console, transient=True, disable=not moving) as bar:
         task = bar.add_task(visible(description), total=1.0)
 
         def show(share: float, text: str = "") -> None:
             bar.update(task, completed=share, description=visible(text or description))
-            tell(share, text)
+            write_progress(share, text)
 
         yield show
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reflowshock.effect import Decision, decided
+from reflowshock.effect import Decision, decide_all
 from reflowshock.fem.problem.thermal import Thermal
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def thermal_effects(case: "PackageCase", thermal: Thermal, temperatures: Sequenc
         standoff=package.standoff,
     )
     heated = Heated(thermal, case.materials.by_role, sizes, case.solder.surface_tension, temperatures)
-    return decided(HEATED_EFFECTS, heated)
+    return decide_all(HEATED_EFFECTS, heated)
 
 
 def open_structure(

@@ -55,7 +55,7 @@ class Scale:
     """Scales of the residuals: the pull of surface tension.
 
     Attributes:
-        pull: pi a gamma, times the pad's radius a for moments, shape (joints, 2, 6) [N, N m].
+        pull: Capillary pull pi a gamma, times the pad's radius a for moments, shape (joints, 2, 6) [N, N m].
         rigid: Pull of all joints along each rigid motion, shape (k,) [N, N m].
         tolerance: Tolerance of both residuals.
     """
@@ -196,13 +196,13 @@ class Coupling:
         """Return the wrenches of the joints on displaced pads, in space, shape (joints, 2, 6) [N, N m]."""
         from scipy.spatial.transform import Rotation
 
-        by_joint = self.joints.exchange(number, placed(self.drawn, pad_motion))
+        by_joint = self.joints.exchange(number, place_joints(self.drawn, pad_motion))
         local = np.array([by_joint[name] for name in self.drawn]).reshape(-1, 2, 2, 3)
         turns = Rotation.from_rotvec(pad_motion[:, 0, 3:]).as_matrix()
         return np.einsum("jik,jswk->jswi", turns, local).reshape(-1, 2, 6)
 
 
-def placed(drawn: "Mapping[str, JointGeometry]", pad_motion: Floats) -> "dict[str, JointGeometry]":
+def place_joints(drawn: "Mapping[str, JointGeometry]", pad_motion: Floats) -> "dict[str, JointGeometry]":
     """Return the geometry of each joint between displaced pads, in the frame of its pad on the board.
 
     Args:

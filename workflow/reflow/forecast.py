@@ -78,6 +78,9 @@ def problems(
         geometries: Geometry as drawn by joint name.
         thermal: Temperatures, and motion of the package.
         pitch: Distance of neighbouring joints [m].
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
     """
     yield from _no_time(solder, geometries)
     yield from _no_room(solder, min(geometry.gap for geometry in geometries.values()), thermal, pitch)

@@ -15,7 +15,7 @@ from reflowshock.workflow.package.case import PackageCase, joint_geometries
 from reflowshock.workflow.process.terminal import ProgressBar, progress_bar
 from reflowshock.workflow.reflow.array import CarriedGroup, JointArray, Source
 from reflowshock.workflow.reflow.between import frozen_displacement, open_structure, thermal_effects
-from reflowshock.workflow.reflow.coupling import Coupled, Coupling, Exchange, placed, scale_of, start
+from reflowshock.workflow.reflow.coupling import Coupled, Coupling, Exchange, place_joints, scale_of, start
 from reflowshock.workflow.reflow.forecast import LoadStep, load_steps
 from reflowshock.workflow.reflow.joints import JointGroup
 from reflowshock.workflow.reflow.pool import Shares
@@ -90,7 +90,7 @@ def reflow_heated(run: Run[PackageCase], thermal: Thermal, pads: "list[PadSite]"
         metrics, health = _judge(coupling, coupled, steps, thermal)
         assert coupled.state is not None
         return Heated(
-            geometries=placed(drawn, coupled.state.pad_motion),
+            geometries=place_joints(drawn, coupled.state.pad_motion),
             groups=[carried.group for carried in joints.groups],
             shapes=joints.shapes(),
             coupled=coupled,
@@ -114,7 +114,7 @@ def _start(
     """Return the initial state, with the pads where the structure has them without solder."""
     modes = structure.rigid_modes
     alone = structure.solve(first.temperature, first.corner, *_no_loads(structure))
-    return start(list(placed(drawn, alone.pad_motion).values()), case.solder, modes)
+    return start(list(place_joints(drawn, alone.pad_motion).values()), case.solder, modes)
 
 
 def _no_loads(structure: "HeatedStructure") -> tuple[np.ndarray, np.ndarray]:
@@ -205,10 +205,10 @@ def _judge(coupling: Coupling, coupled: Coupled, steps: list[LoadStep], thermal:
     without, _ = _no_loads(structure)
     alone = structure.solve(steps[-1].temperature, steps[-1].corner, without, coupled.rigid)
     spreads = [
-        float(np.ptp([joint.gap for joint in placed(drawn, state.pad_motion).values()]))
+        float(np.ptp([joint.gap for joint in place_joints(drawn, state.pad_motion).values()]))
         for state in (coupled.state, alone)
     ]
-    gaps = [joint.gap for joint in placed(drawn, coupled.state.pad_motion).values()]
+    gaps = [joint.gap for joint in place_joints(drawn, coupled.state.pad_motion).values()]
     metrics = {
         "load_steps": metric(len(steps)),
         "exchanges": metric(len(coupled.exchanges)),

@@ -91,12 +91,12 @@ def joint_records(
         ``mirror`` and ``turn`` [rad], a reflection of y followed by a rotation about z, which give the joint from that
         shape; ``place``, the position of the package's pad relative to the board's; ``verdict`` and ``metrics``.
     """
-    from reflowshock.particles.scenes.products import untimed
+    from reflowshock.particles.scenes.products import remove_timings
 
     records: dict[str, dict] = {}
     for group in groups:
         shape = shapes[group.name]
-        metrics = {key: {"value": value, "unit": unit} for key, (value, unit) in untimed(shape.metrics).items()}
+        metrics = {key: {"value": value, "unit": unit} for key, (value, unit) in remove_timings(shape.metrics).items()}
         for name, orientation in group.members.items():
             geometry = geometries[name]
             records[name] = {

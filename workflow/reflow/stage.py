@@ -45,18 +45,24 @@ class Reflowed:
 
 
 def reflow(run: Run[PackageCase], folder: Path) -> Findings:
-    """Reflow the solder of the array; write shapes, records of the joints, and the pad table at solidification."""
-    from reflowshock.meshing.board.pads import lifted, read_pads, write_pads
+    """Reflow the solder of the array; write shapes, records of the joints, and the pad table at solidification.
+
+    Args:
+        run: Case, cores, and run folder from which the products of earlier stages are read.
+        folder: Folder into which the products of the stage are written.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
+    """
+    from reflowshock.meshing.board.pads import lift_pads, read_pads, write_pads
     from reflowshock.particles.parameters.effects import decide_effects
     from reflowshock.particles.scenes.products import write_shapes
 
     case, solder = run.case, run.case.solder
     drawn = read_pads(run.folder / "geometry/pads.json")
-    lifted_pads = lifted(drawn, case.package, case.warpage)
+    lifted_pads = lift_pads(drawn, case.package, case.warpage)
     result = (
-        _between_plates(run, lifted_pads)
-        if case.thermal is None
-        else _heated(run, lifted_pads, folder / "heated.msh")
+        _between_plates(run, lifted_pads) if case.thermal is None else _heated(run, lifted_pads, folder / "heated.msh")
     )
     flowed = {name: result.geometries[name] for group in result.groups for name in group.members}
     joints = pool.joint_records(result.groups, flowed, result.shapes) | given_records(case.package, result.pads, flowed)

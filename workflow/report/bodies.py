@@ -28,7 +28,7 @@ def body_group(
         series: Cells, displacements and parts (``fields["part"]``) of the run.
         chosen: Mask of the selected cells, shape (c,).
         values: Cell values of each field, shape (k, c); a vertex gets the mean over its faces.
-        style: Further attributes of the group.
+        style: Further attributes of ``Group``, such as ``colour``.
     """
     faces, cell = boundary(series.cells[chosen])
     part = series.fields["part"][0][chosen].astype(np.int64)[cell]
@@ -57,7 +57,12 @@ def _at_vertices(values: Floats, faces: NDArray[np.int64], count: int) -> Floats
 
 
 def exaggeration(length: float, deflection: float) -> float:
-    """Return the scale factor of a drawn deflection; 1 for a body at rest."""
+    """Return the factor by which displacements are enlarged in a picture; 1 for a body at rest.
+
+    Args:
+        length: Size of the body [m].
+        deflection: Largest displacement [m].
+    """
     return max(round_down(SHARE * length / deflection), 1.0) if deflection > 0.0 else 1.0
 
 

@@ -47,7 +47,7 @@ class Series:
         """Return the record that the script reads."""
         x, y = np.asarray(self.x, dtype=float), np.asarray(self.y, dtype=float)
         if not self.labels:
-            x, y = thinned(x, y)
+            x, y = thin_samples(x, y)
         return {
             "name": self.name,
             "x": page.array(x, "f4"),
@@ -111,12 +111,16 @@ class Chart:
         }
 
 
-def thinned(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def thin_samples(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Reduce a line to ``MOST_POINTS`` points, the minimum and the maximum of each short interval.
 
     Args:
         x: Ascending abscissae, shape (n,).
         y: Ordinates, shape (n,); a line with missing values is not reduced.
+
+    Returns:
+        Abscissae and ordinates of at most ``MOST_POINTS`` points, each of shape (m,); short lines are returned
+        unchanged.
     """
     if len(x) <= MOST_POINTS or not np.isfinite(y).all():
         return x, y

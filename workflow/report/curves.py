@@ -28,7 +28,7 @@ def history_curves(histories: Histories, critical_joint: str) -> list[Chart]:
     """Return charts of pulse, board and die displacement, board strain and stress of the critical joint.
 
     Args:
-        histories: Arrays of ``history.npz`` by mode.
+        histories: Mode -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity.
         critical_joint: Name of the joint whose stress is drawn.
     """
     quantities = (
@@ -53,7 +53,12 @@ def history_curves(histories: Histories, critical_joint: str) -> list[Chart]:
 
 
 def difference_curves(histories: Histories, critical_joint: str) -> list[Chart]:
-    """Return charts of two-scale minus DNS, die displacement and critical stress; empty unless both were run."""
+    """Return charts of two-scale minus DNS, die displacement and critical stress; empty unless both were run.
+
+    Args:
+        histories: Mode -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity.
+        critical_joint: Name of the joint whose stress is drawn.
+    """
     if len(histories) < 2:
         return []
     ours, reference = histories["two_scale"], histories["dns"]
@@ -72,7 +77,12 @@ def difference_curves(histories: Histories, critical_joint: str) -> list[Chart]:
 
 
 def energy_curves(history: Mapping[str, NDArray]) -> list[Chart]:
-    """Return charts of the energies of one run and of its balance relative to the largest energy."""
+    """Return charts of the energies of one run and of its balance relative to the largest energy.
+
+    Args:
+        history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity;
+            energies in J.
+    """
     time = _time(history)
     terms = [
         Series(name, time, history[name] / MILLI, colour)

@@ -32,7 +32,13 @@ class Discretisation:
 
 
 def scheme_error(name: str, results: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return the difference of a figure between the first mode and one model on the same mesh, as text."""
+    """Return the difference of a figure between the first mode and one model on the same mesh, as text.
+
+    Args:
+        name: Name of the metric.
+        results: Mode -> content of its ``result.json`` (``model``, ``metrics``, ``health``, ``timings``, ``coupling``);
+            with one mode the error is unknown, or none for a DNS.
+    """
     first, *others = results
     if not others:
         return "none: one model" if first == "dns" else NOT_KNOWN
@@ -46,7 +52,12 @@ def scheme_error(name: str, results: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def left_out(effects: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return the neglected effects with their expected influence, the largest first, as text."""
+    """Return the neglected effects with their expected influence, the largest first, as text.
+
+    Args:
+        effects: Name of an effect -> its decision: ``on``, ``why`` and, if predicted, ``influence`` (relative change of
+            the result).
+    """
     influence = {name: item["influence"] for name, item in effects.items() if not item["on"] and "influence" in item}
     large = sorted(
         (name for name in influence if influence[name] >= NEGLIGIBLE), key=influence.__getitem__, reverse=True

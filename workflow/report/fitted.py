@@ -20,8 +20,11 @@ def gauge_table(gauges: "Mapping[str, StrainGauge]", metrics: Mapping[str, Any],
 
     Args:
         gauges: Gauges by name.
-        metrics: Metrics of the run.
+        metrics: Name -> record with ``value`` (SI) and ``unit``; ``peak_strain@<gauge>`` must exist.
         lengths: Length of each gauge in the model [m].
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text); an empty dict without gauges.
     """
     rows = []
     for name, gauge in gauges.items():
@@ -47,7 +50,13 @@ def in_mm(position: tuple[float, ...]) -> str:
 
 
 def gauge_curves(histories: Histories, gauges: "Mapping[str, StrainGauge]", styles: Mapping[str, dict]) -> list[Chart]:
-    """Return a chart of the strain of every gauge."""
+    """Return one chart for each gauge, with its strain over time in every run.
+
+    Args:
+        histories: Mode or solver -> arrays of its ``history.npz``, with ``time`` and ``gauge@<name>``, both shape (k,).
+        gauges: Gauges by name.
+        styles: Mode or solver -> attributes of its line: name, colour, line style.
+    """
     return [
         Chart(
             TIME,

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.output.ranking import PEEL, VON_MISES, Measure, ranked
+from reflowshock.fem.output.ranking import PEEL, VON_MISES, Measure, rank_joints
 from reflowshock.fem.output.settled import is_settled, settling_measures
 
 Arrays = Mapping[str, NDArray]
@@ -16,7 +16,15 @@ MODES = ("two_scale", "dns")
 
 
 def read_modes(shock: Path, modes: tuple[str, ...] = MODES) -> tuple[dict[str, dict], dict[str, dict]]:
-    """Read histories and results of the modes that were run, by mode."""
+    """Read histories and results of the modes that were run.
+
+    Args:
+        shock: Folder of the shock, with a folder for each mode.
+        modes: Names of the modes to read, in the order of the results.
+
+    Returns:
+        Mode -> arrays of ``history.npz``, and mode -> content of ``result.json``; modes without a history are left out.
+    """
     histories, results = {}, {}
     for mode in modes:
         folder = shock / mode
@@ -28,18 +36,33 @@ def read_modes(shock: Path, modes: tuple[str, ...] = MODES) -> tuple[dict[str, d
 
 
 def joint_stress(history: Arrays, joint: str, measure: Measure = VON_MISES) -> NDArray[np.float64]:
-    """Return the stress of a joint at its worse pad, shape (k,) [Pa]."""
+    """Return the stress of a joint at its worse pad over time, shape (k,) [Pa].
+
+    Args:
+        history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity.
+        joint: Name of a joint in the history.
+        measure: Stress measure, such as von Mises or peel stress; the worse pad has the larger peak.
+    """
     return measure.worse(history)[:, list(map(str, history["joints"])).index(joint)]
 
 
 def peel_peaks(history: Arrays) -> dict[str, float]:
-    """Return the peak peel stress [Pa] by joint, the critical joint first."""
+    """Return the peak peel stress [Pa] by joint, the critical joint first.
+
+    Args:
+        history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity.
+    """
     peaks = PEEL.peaks(history)
-    return {str(history["joints"][column]): float(peaks[column]) for column in ranked(history)}
+    return {str(history["joints"][column]): float(peaks[column]) for column in rank_joints(history)}
 
 
 def unsettled(history: Arrays, longest: float) -> str:
-    """Return a warning if a shock of automatic duration ended at its longest time [s] unsettled; else empty."""
+    """Return a warning if a shock of automatic duration ended at its longest time [s] unsettled; else empty.
+
+    Args:
+        history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity.
+        longest: Longest automatic duration [s].
+    """
     if is_settled(history):
         return ""
     return (
@@ -49,7 +72,11 @@ def unsettled(history: Arrays, longest: float) -> str:
 
 
 def late_peak(history: Arrays) -> str:
-    """Return a warning if the peel or elastic von Mises stress peaks at the end of the run; else empty."""
+    """Return a warning if the peel or elastic von Mises stress peaks at the end of the run; else empty.
+
+    Args:
+        history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity.
+    """
     names = {PEEL: "peel", VON_MISES: "von Mises"}
     largest = {names[measure]: measure.worse(history).max(axis=1) for measure in settling_measures(history)}
     late = [name for name, stress in largest.items() if peaks_late(stress)]

@@ -9,7 +9,7 @@ import numpy as np
 
 from reflowshock.arrays import Floats
 from reflowshock.workflow.report.colours import SCALES
-from reflowshock.workflow.report.scene import Field, Group, Scene, decimated
+from reflowshock.workflow.report.scene import Field, Group, Scene, decimate
 
 SIZE = (720, 480)  # pixels
 FRAME, LAST = 350, 1500  # [ms] duration of a frame and of the last frame
@@ -20,7 +20,7 @@ MARGIN = 0.35  # margin around the focus, as a share of its size
 
 
 def write_movie(scene: Scene, path: Path) -> None:
-    """Write the frames of a scene as a GIF, with the initial displacement scale of the page.
+    """Write the frames of a scene as an animated GIF, with the initial displacement scale of the page.
 
     Args:
         scene: Scene with two frames or more.
@@ -29,7 +29,7 @@ def write_movie(scene: Scene, path: Path) -> None:
     import pyvista
     from PIL import Image
 
-    groups = [group for group in decimated(scene.groups) if len(group.points)]
+    groups = [group for group in decimate(scene.groups) if len(group.points)]
     plotter = pyvista.Plotter(off_screen=True, window_size=list(SIZE))
     plotter.set_background("white")
     pictures = []

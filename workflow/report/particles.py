@@ -16,7 +16,11 @@ NO_FACES = np.zeros((0, 3), dtype=int)
 
 
 def particle_scene(shape: "JointShape") -> Scene:
-    """Return the scene of a solder body: the stored states, then the final state coloured by pressure."""
+    """Return the scene of a solder body: the stored states, then the final state coloured by pressure.
+
+    Args:
+        shape: Result of a reflow: particles, free surface and history of one solder body.
+    """
     states = [*((state.points, state.triangles) for state in shape.snapshots[:-1]), (shape.points, shape.triangles)]
     frames = [f"{1e3 * state.time:.4g} ms" for state in shape.snapshots[:-1]] + ["end"]
     size = 0.8 * float(np.cbrt(np.prod(np.ptp(shape.points, axis=0)) / len(shape.points)))

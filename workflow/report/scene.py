@@ -116,7 +116,7 @@ class Scene:
 
     def record(self, page: "PageData") -> dict:
         """Return the record that the script reads, lengths in mm."""
-        groups = [group for group in decimated(self.groups) if len(group.points)]
+        groups = [group for group in decimate(self.groups) if len(group.points)]
         always = sum(len(group.points) for group in groups if group.only is None)
         frames = kept_frames(len(self.frames), MOST_VALUES // max(always, 1), self.start)
         return {
@@ -150,8 +150,13 @@ def boundary(cells: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.
     return faces[chosen], chosen // len(local)
 
 
-def decimated(groups: Sequence[Group], most: int = MOST_TRIANGLES) -> list[Group]:
-    """Reduce groups to at most ``most`` triangles, coarsening all but small groups by the same share."""
+def decimate(groups: Sequence[Group], most: int = MOST_TRIANGLES) -> list[Group]:
+    """Reduce groups to at most ``most`` triangles, coarsening all but small groups by the same share.
+
+    Args:
+        groups: Surfaces of a scene; quadrilaterals count as two triangles.
+        most: Largest number of triangles of all groups together.
+    """
     total = sum(group.triangles for group in groups)
     if total <= most:
         return list(groups)
@@ -195,7 +200,13 @@ def _as_triangles(faces: NDArray[np.integer]) -> NDArray[np.integer]:
 
 
 def kept_frames(frames: int, most: int, start: int) -> list[int]:
-    """Return at most ``most`` evenly spaced frames, at least one, that include the initial frame ``start``."""
+    """Return at most ``most`` evenly spaced frame numbers, at least one, that include the initial frame.
+
+    Args:
+        frames: Number of frames.
+        most: Largest number of frames to keep.
+        start: Number of the initial frame, counted from 0.
+    """
     frames_kept = sorted({round(position) for position in np.linspace(0, frames - 1, min(frames, max(most, 1)))})
     nearest = min(range(len(frames_kept)), key=lambda k: abs(frames_kept[k] - start))
     return sorted({*frames_kept[:nearest], start, *frames_kept[nearest + 1 :]})

@@ -21,7 +21,12 @@ LEAST = 20.0  # samples in a period of the highest frequency
 
 
 def spectrum_curves(pulses: "Mapping[str, Pulse]", duration: float) -> list[Chart]:
-    """Return a chart of the response spectra of inputs over the duration [s] of a run; empty without inputs."""
+    """Return a chart of the response spectra of inputs over the duration [s] of a run; empty without inputs.
+
+    Args:
+        pulses: Name -> input acceleration.
+        duration: Duration of the run [s].
+    """
     from reflowshock.fem.output.response_spectrum import QUALITY, spectrum_frequencies
 
     if not pulses:
@@ -36,7 +41,16 @@ def spectrum_curves(pulses: "Mapping[str, Pulse]", duration: float) -> list[Char
 
 
 def spectrum(pulse: "Pulse", duration: float, frequencies: "NDArray[np.float64]") -> "NDArray[np.float64]":
-    """Return the response spectrum of a pulse over ``duration`` [s] at frequencies [Hz], both shape (k,) [G]."""
+    """Return the shock response spectrum of a pulse: peak acceleration of an oscillator over its natural frequency.
+
+    Args:
+        pulse: Input acceleration over time.
+        duration: Duration of the response [s].
+        frequencies: Natural frequencies, shape (k,) [Hz].
+
+    Returns:
+        Peak accelerations, shape (k,) [G].
+    """
     from reflowshock.fem.output.response_spectrum import response_spectrum
 
     step = duration / SAMPLES
@@ -45,7 +59,14 @@ def spectrum(pulse: "Pulse", duration: float, frequencies: "NDArray[np.float64]"
 
 
 def mode_table(modes: Sequence[Mapping]) -> dict:
-    """Return the table of natural frequencies and effective mass fractions of the modes."""
+    """Return the table of natural frequencies and effective mass fractions of the modes.
+
+    Args:
+        modes: Records with ``mode`` (number), ``frequency`` [Hz] and ``mass_fraction`` by axis "x", "y", "z".
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text).
+    """
     rows = [
         [
             f"{mode['mode']}",

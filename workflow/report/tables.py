@@ -62,17 +62,38 @@ MODEL_ROWS = (
 
 
 def headline(metrics: dict) -> list[dict]:
-    """Return the figures of ``HEADLINE`` that the run has."""
+    """Return the figures of ``HEADLINE`` that the run has: records with ``label`` and ``value`` as text.
+
+    Args:
+        metrics: Name -> record with ``value`` (SI) and ``unit``.
+    """
     return [{"label": label, "value": named_quantity(metrics, name)} for name, label in HEADLINE if name in metrics]
 
 
 def figures_of(names: Sequence[str], metrics: dict, text: Text) -> list[dict]:
-    """Return figures of the named metrics that the run has; ``text`` formats name and record."""
+    """Return the named metrics that the run has, as records with ``label`` and ``value`` as text.
+
+    Args:
+        names: Names of metrics, in the order of the result.
+        metrics: Name -> record with ``value`` (SI) and ``unit``.
+        text: Function of name and record of a metric that returns its text.
+    """
     return [{"label": name.replace("_", " "), "value": text(name, metrics[name])} for name in names if name in metrics]
 
 
 def limited_metrics(metrics: dict, health: dict, text: Text) -> dict:
-    """Return the table of all metrics with their limits; ``text`` formats a metric by name and record."""
+    """Return the table of all metrics with their limits.
+
+    Args:
+        metrics: Name -> record with ``value`` (SI) and ``unit``.
+        health: Name of a check -> record with ``value``, ``limit`` and ``ok``; a check limits the metric of the same
+            name.
+        text: Function of name and record of a metric that returns its text.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text); the limit is empty for a metric without a
+        check.
+    """
     rows = []
     for name, metric in metrics.items():
         limit = text(name, metric | {"value": health[name]["limit"]}) if name in health else ""
@@ -81,7 +102,11 @@ def limited_metrics(metrics: dict, health: dict, text: Text) -> dict:
 
 
 def health_rows(health: dict) -> list[dict]:
-    """Return one record for each health check: name, value and limit as text, and ok."""
+    """Return one record for each health check: name, value and limit as text, and ok.
+
+    Args:
+        health: Name of a check -> record with ``value``, ``limit`` and ``ok``.
+    """
     texts = {name: against_limit(name, check) for name, check in health.items()}
     return [
         {"name": name.replace("_", " "), "value": value, "limit": limit, "ok": health[name]["ok"]}
@@ -90,7 +115,12 @@ def health_rows(health: dict) -> list[dict]:
 
 
 def versions() -> dict:
-    """Return the table of installed versions of the numerical libraries."""
+    """Return the table of installed versions of the numerical libraries.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text); the version of a missing library is "not
+        found".
+    """
     rows = []
     for name in PACKAGES:
         try:
@@ -101,7 +131,15 @@ def versions() -> dict:
 
 
 def comparison(metrics: dict) -> dict | None:
-    """Return the table of two-scale against DNS; None unless both were run."""
+    """Return the table of two-scale against DNS; None unless both were run.
+
+    Args:
+        metrics: Name -> record with ``value`` (SI) and ``unit``.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text): label and value; None unless both modes were
+        run.
+    """
     if "two_scale_dns_core_ratio" not in metrics:
         return None
     rows = [[label, named_quantity(metrics, name)] for name, label in COMPARISON if name in metrics]
@@ -109,7 +147,15 @@ def comparison(metrics: dict) -> dict | None:
 
 
 def energies(histories: dict[str, dict]) -> dict:
-    """Return the table of the largest value of every energy, one column for each mode."""
+    """Return the table of the largest magnitude of each energy in time, one column for each mode.
+
+    Args:
+        histories: Mode -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity, among
+            them the energies [J].
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text).
+    """
     terms = ("kinetic", "internal", "plastic", "hourglass", "damping", "external", "interface", "balance")
     largest = {
         term: [float(np.max(np.abs(history[term]))) for history in histories.values()]
@@ -126,7 +172,14 @@ def energies(histories: dict[str, dict]) -> dict:
 
 
 def models(results: dict[str, dict]) -> dict:
-    """Return the table of model sizes and time steps, one column for each mode."""
+    """Return the table of model sizes and time steps, one column for each mode.
+
+    Args:
+        results: Mode -> content of its ``result.json`` (``model``, ``metrics``, ``health``, ``timings``, ``coupling``).
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text).
+    """
     records = [result["model"] for result in results.values()]
     rows = [[label, *(text(record) for record in records)] for label, text in MODEL_ROWS]
     roles = dict.fromkeys(role for record in records for role in record["critical_steps"])
@@ -138,7 +191,14 @@ def models(results: dict[str, dict]) -> dict:
 
 
 def costs(results: dict[str, dict]) -> dict:
-    """Return the table of timings of each shock run."""
+    """Return the table of wall times [s] of each activity, one column for each run.
+
+    Args:
+        results: Mode or solver -> content of its ``result.json``, of which ``timings`` is read.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text).
+    """
     return _side_by_side(results, "timings", "seconds")
 
 
@@ -166,7 +226,7 @@ def _cell(value) -> str:
 
 
 def mode_name(mode: str) -> str:
-    """Return the display name of a mode."""
+    """Return the display name of a mode: "two-scale", "DNS", or the name itself for others."""
     return {"two_scale": "two-scale", "dns": "DNS"}.get(mode, mode)
 
 

@@ -25,7 +25,13 @@ STYLES = ("uplot.min.css", "style.css")
 
 
 def write_page(path: Path, template: str, context: dict) -> None:
-    """Render a page from a template, write it under a temporary name and rename it."""
+    """Render a page from a template, write it under a temporary name and rename it.
+
+    Args:
+        path: HTML file to write; an existing one is replaced.
+        template: Name of the template.
+        context: Values of the template's variables by name.
+    """
     environment = template_environment(TEMPLATES)
     environment.globals |= {"data": PageData(), "script": script(), "style": style(), "policy": policy()}
     partial = path.with_name(f".{path.name}.partial")
@@ -47,13 +53,13 @@ def template_environment(folder: Path) -> jinja2.Environment:
 
 @cache
 def script() -> Markup:
-    """Return the script of a page."""
+    """Return the JavaScript that draws charts and scenes, to be inserted into a page."""
     return Markup("\n".join((ASSETS / name).read_text(encoding="utf-8") for name in SCRIPTS))
 
 
 @cache
 def style() -> Markup:
-    """Return the style of a page."""
+    """Return the CSS of a page, to be inserted into it."""
     return Markup("\n".join((ASSETS / name).read_text(encoding="utf-8") for name in STYLES))
 
 

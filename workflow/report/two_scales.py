@@ -30,9 +30,12 @@ def two_scales(coupling: Record, model: Record, found_by: str = "") -> dict:
     """Return the table of the coupling of a two-scale run.
 
     Args:
-        coupling: Entry ``coupling`` of its ``result.json``.
-        model: Entry ``model`` of its ``result.json``.
+        coupling: Entry ``coupling`` of its ``result.json``; entries that are missing are left out.
+        model: Entry ``model`` of its ``result.json``, with ``window`` [s] and ``substeps``.
         found_by: How a coarse run selected the fine joints; empty without one.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text): name and value.
     """
     scheme, joints = coupling.get("scheme"), coupling.get("fine_joints")
     rows = [
@@ -52,7 +55,14 @@ def two_scales(coupling: Record, model: Record, found_by: str = "") -> dict:
 
 
 def levels(coupling: Record) -> dict | None:
-    """Return the table of step levels, level 0 being the window; None without levels."""
+    """Return the table of step levels, level 0 being the window; None without levels.
+
+    Args:
+        coupling: Entry ``coupling`` of a ``result.json``; ``levels`` lists ``step`` [s], ``elements``, ``cost_share``.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text); None without levels.
+    """
     rows = [
         [str(level), nano(record["step"]), number(record["elements"]), _share(record.get("cost_share")) or "–"]
         for level, record in enumerate(coupling.get("levels", ()))
@@ -61,7 +71,14 @@ def levels(coupling: Record) -> dict | None:
 
 
 def placement(coupling: Record) -> dict | None:
-    """Return the table of predicted and measured window times and the load of the ranks; None without them."""
+    """Return the table of predicted and measured window times and the load of the ranks; None without them.
+
+    Args:
+        coupling: Entry ``coupling`` of a ``result.json``, with its ``placement``.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text): name and value; None without a placement.
+    """
     record = coupling.get("placement", {})
     rows = [
         (f"window, predicted, {name}{' (chosen)' if name == record.get('chosen') else ''}", short(seconds))
@@ -80,7 +97,7 @@ def oracle(seconds: float, results: Sequence[Record]) -> str:
 
     Args:
         seconds: Predicted time of the implicit run on one rank [s].
-        results: ``result.json`` of the two-scale run and of a preceding coarse run.
+        results: Contents of ``result.json`` of the two-scale run and, if there was one, of the preceding coarse run.
     """
     core_seconds = sum(result["timings"]["windows"] * result["model"]["ranks"] for result in results)
     runs = "the two-scale run" if len(results) == 1 else "the two-scale run and the preceding coarse run"

@@ -98,28 +98,44 @@ class OscillationCase(Case):
 
 
 def check_drop(case: DropCase) -> list[Problem]:
-    """Find contradictions between the parameters of a drop."""
+    """Find contradictions between the parameters of a drop.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
+    """
     from reflowshock.particles.parameters.scene_checks import drop_problems
 
     return drop_problems(case.drop, case.molten)
 
 
 def check_joint(case: JointCase) -> list[Problem]:
-    """Find contradictions between the parameters of a joint."""
+    """Find contradictions between the parameters of a joint.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
+    """
     from reflowshock.particles.parameters.joint_checks import joint_problems
 
     return joint_problems(case.joint, case.molten)
 
 
 def check_drops(case: DropsCase) -> list[Problem]:
-    """Find contradictions between the parameters of two drops."""
+    """Find contradictions between the parameters of two drops.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
+    """
     from reflowshock.particles.parameters.scene_checks import pair_problems
 
     return pair_problems(case.drops, case.molten)
 
 
 def check_oscillation(case: OscillationCase) -> list[Problem]:
-    """Find parameters with which a drop would not oscillate."""
+    """Find parameters with which a drop would not oscillate.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
+    """
     from reflowshock.particles.parameters.scene_checks import oscillation_problems
 
     return oscillation_problems(case.oscillation, case.molten)

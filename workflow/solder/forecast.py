@@ -10,7 +10,7 @@ from rich.console import RenderableType
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.forecast import BYTES_OF_PARTICLE, Size
 from reflowshock.workflow.case.text import short
-from reflowshock.workflow.process.terminal import REFLOW_SPEED, new_table, styled
+from reflowshock.workflow.process.terminal import REFLOW_SPEED, new_table, style_text
 from reflowshock.workflow.solder.case import DropCase, DropsCase, JointCase, OscillationCase, SolderCase
 
 SCHEMES = {
@@ -170,4 +170,4 @@ def solder_tables(_case: Case, forecast: SolderForecast) -> Iterator[RenderableT
     ratio = forecast.largest_step / forecast.capillary_limit
     table.add_row("largest time step", short(forecast.largest_step), f"{ratio:.3g} times the limit")
     yield table
-    yield styled("\n[dim]{}", REFLOW_SPEED)
+    yield style_text("\n[dim]{}", REFLOW_SPEED)

@@ -34,7 +34,15 @@ Numbers = Mapping[str, tuple[float, str]]
 
 
 def reflow_drop(run: Run[DropCase], folder: Path) -> Findings:
-    """Melt a cube of solder on a wall or pad, or without a wall, until it is at rest."""
+    """Melt a cube of solder on a wall or pad, or without a wall, until it is at rest.
+
+    Args:
+        run: Case, cores, and run folder from which the products of earlier stages are read.
+        folder: Folder into which the products of the stage are written.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
+    """
     from reflowshock.particles.core.checkpoint import Checkpoint
     from reflowshock.particles.scenes.drop_at_rest import drop_to_rest
     from reflowshock.particles.scenes.products import write_body
@@ -49,7 +57,15 @@ def reflow_drop(run: Run[DropCase], folder: Path) -> Findings:
 
 
 def reflow_joint(run: Run[JointCase], folder: Path) -> Findings:
-    """Melt the solder of one joint between its pads until it is at rest, at each position of the package."""
+    """Melt the solder of one joint between its pads until it is at rest, at each position of the package.
+
+    Args:
+        run: Case, cores, and run folder from which the products of earlier stages are read.
+        folder: Folder into which the products of the stage are written.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
+    """
     from reflowshock.particles.core.checkpoint import Checkpoint
     from reflowshock.particles.scenes.joint_at_rest import joint_to_rest
     from reflowshock.particles.scenes.products import write_body
@@ -71,7 +87,15 @@ def reflow_joint(run: Run[JointCase], folder: Path) -> Findings:
 
 
 def reflow_drops(run: Run[DropsCase], folder: Path) -> Findings:
-    """Compute two drops until they, or the merged drop, are at rest."""
+    """Compute two drops until they, or the merged drop, are at rest.
+
+    Args:
+        run: Case, cores, and run folder from which the products of earlier stages are read.
+        folder: Folder into which the products of the stage are written.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
+    """
     from reflowshock.particles.core.checkpoint import Checkpoint
     from reflowshock.particles.scenes.drop_pair import pair_to_rest
     from reflowshock.particles.scenes.products import write_body
@@ -86,7 +110,15 @@ def reflow_drops(run: Run[DropsCase], folder: Path) -> Findings:
 
 
 def reflow_oscillation(run: Run[OscillationCase], folder: Path) -> Findings:
-    """Compute the oscillation of a free drop."""
+    """Compute the oscillation of a free drop.
+
+    Args:
+        run: Case, cores, and run folder from which the products of earlier stages are read.
+        folder: Folder into which the products of the stage are written.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
+    """
     from reflowshock.particles.core.checkpoint import Checkpoint
     from reflowshock.particles.parameters.effects import decide_oscillation
     from reflowshock.particles.scenes.free_drop import solve_oscillation
@@ -108,6 +140,9 @@ def judge_drop(metrics: Numbers, verdict: str, effects: Mapping[str, Any]) -> Fi
         metrics: Metric -> value and unit.
         verdict: Verdict on the shape.
         effects: Decided effects.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
     """
     limits = {
         "height_error": DROP_ERROR,
@@ -123,6 +158,9 @@ def judge_joint(metrics: Numbers, verdict: str, effects: Mapping[str, Any]) -> F
     """Check one joint by volume, rest, verdict and, if it is axisymmetric, the Young-Laplace shape.
 
     A package that is pulled off leaves an open joint. This is a valid result, checked by the remaining drops.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
     """
     named = {ONE_JOINT_NAMES.get(name, name): number for name, number in metrics.items()}
     limits = {"max_width_error": JOINT_ERROR, "waist_error": JOINT_ERROR}
@@ -138,7 +176,11 @@ def judge_joint(metrics: Numbers, verdict: str, effects: Mapping[str, Any]) -> F
 
 
 def judge_drops(metrics: Numbers, expected: int, effects: Mapping[str, Any]) -> Findings:
-    """Check drops by their number, volume, rest and exact shapes; ``expected`` is the number of drops at the end."""
+    """Check drops by their number, volume, rest and exact shapes; ``expected`` is the number of drops at the end.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
+    """
     limits = {"height_error": DROP_ERROR, "max_width_error": DROP_ERROR, "radius_error": DROP_ERROR}
     unexpected = abs(int(metrics["drops_left"][0]) - expected)
     health = _at_rest(metrics, limits) | {"drops_not_as_meant": at_most(unexpected, 0)}
@@ -146,7 +188,11 @@ def judge_drops(metrics: Numbers, expected: int, effects: Mapping[str, Any]) -> 
 
 
 def judge_oscillation(metrics: Numbers, effects: Mapping[str, Any]) -> Findings:
-    """Check an oscillating drop by volume, and by the period and decay rate of Reid."""
+    """Check an oscillating drop by volume, and by the period and decay rate of Reid.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
+    """
     limits = {"period_error": PERIOD_ERROR, "decay_rate_error": DECAY_RATE_ERROR}
     return Findings(_finite(metrics), _at_rest(metrics, limits), dict(effects))
 

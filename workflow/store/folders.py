@@ -21,20 +21,20 @@ UNKNOWN = {"holds": "run", "name": "an unknown case (its mark is damaged)"}
 
 
 class RunFolderBusy(RuntimeError):
-    """Another process is running in the run folder."""
+    """Error for a folder in which another process is running."""
 
 
 def check_folder(folder: Path, what: str, name: str, force: bool = False) -> None:
     """Check that a folder is new, empty, or already used by the program for the same case or study.
 
     Args:
-        folder: the folder.
-        what: kind of content, such as "run".
-        name: name of the case or study.
-        force: whether the folder may contain another case or study.
+        folder: The folder.
+        what: Kind of content, such as "run".
+        name: Name of the case or study.
+        force: Whether the folder may contain another case or study.
 
     Raises:
-        CaseError: the path is a file, or the folder contains foreign files or another case or study.
+        CaseError: The path is a file, or the folder contains foreign files or another case or study.
     """
     try:
         folder.lstat()
@@ -56,8 +56,8 @@ def check_folder(folder: Path, what: str, name: str, force: bool = False) -> Non
             folder, "contains files that the program did not write", "an empty folder, or the name of a new one"
         )
     if mark is not None and (mark["holds"], mark["name"]) != (what, name) and not force:
-        held = f"contains the {mark['holds']} of {mark['name']}, not the {what} of {name}"
-        raise _refused(folder, held, "another folder, or --force")
+        content = f"contains the {mark['holds']} of {mark['name']}, not the {what} of {name}"
+        raise _refused(folder, content, "another folder, or --force")
 
 
 def read_mark(folder: Path) -> dict[str, str] | None:
@@ -72,21 +72,21 @@ def read_mark(folder: Path) -> dict[str, str] | None:
 
 
 @contextmanager
-def locked(folder: Path, what: str, name: str, force: bool = False) -> Iterator[int]:
+def lock_folder(folder: Path, what: str, name: str, force: bool = False) -> Iterator[int]:
     """Create and mark a folder and hold its lock, which the system releases when this process ends.
 
     Args:
-        folder: the folder.
-        what: kind of content, such as "run".
-        name: name of the case or study.
-        force: whether the folder may contain another case or study.
+        folder: The folder.
+        what: Kind of content, such as "run".
+        name: Name of the case or study.
+        force: Whether the folder may contain another case or study.
 
     Yields:
         The file descriptor that holds the lock.
 
     Raises:
-        RunFolderBusy: another process holds the lock.
-        CaseError: the folder belongs to something else or is not writable.
+        RunFolderBusy: Another process holds the lock.
+        CaseError: The folder belongs to something else or is not writable.
     """
     check_folder(folder, what, name, force)
     try:
@@ -101,7 +101,7 @@ def locked(folder: Path, what: str, name: str, force: bool = False) -> Iterator[
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
             raise RunFolderBusy(f"another run is active in {folder}") from error
-        if not _is_there(folder / LOCK, descriptor):
+        if not _is_current_lock(folder / LOCK, descriptor):
             raise RunFolderBusy(f"another command has just removed {folder}; try again")
         _mark(folder, what, name)
         _clear_store(folder)
@@ -125,7 +125,7 @@ def is_busy(folder: Path) -> bool:
     return False
 
 
-def remove_own(folder: Path) -> list[str]:
+def remove_program_files(folder: Path) -> list[str]:
     """Remove store, logs, mark and lock of a folder, and the folder itself if it is then empty and not in use.
 
     Returns:
@@ -144,7 +144,7 @@ def remove_own(folder: Path) -> list[str]:
 
 
 def _remove_logs(folder: Path) -> None:
-    """Remove the program's error logs, and their folder if it is empty then."""
+    """Remove the program's error logs, then their folder if it is empty."""
     if folder.is_symlink() or not folder.is_dir():
         return
     for path in folder.glob(f"{LOG}*.txt"):
@@ -163,7 +163,7 @@ def _mark(folder: Path, what: str, name: str) -> None:
     partial.replace(path)
 
 
-def _is_there(lock: Path, descriptor: int) -> bool:
+def _is_current_lock(lock: Path, descriptor: int) -> bool:
     """Return whether the open lock file is still the one in the folder."""
     with suppress(FileNotFoundError):
         return os.path.samestat(lock.stat(), os.fstat(descriptor))

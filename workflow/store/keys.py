@@ -44,10 +44,10 @@ def product_key(case: Case, stage: Stage, inputs: dict, follows: Sequence[str | 
     """Return the key of a product.
 
     Args:
-        case: the case.
-        stage: stage that makes the product.
-        inputs: parameters of the stage, as returned by ``stage_inputs``.
-        follows: product keys of the stages that it follows.
+        case: The case.
+        stage: Stage that makes the product.
+        inputs: Parameters of the stage, as returned by ``stage_inputs``.
+        follows: Product keys of the stages that it follows.
     """
     content = {"version": __version__, "stage": f"{case.kind} {stage.name}", "inputs": inputs, "follows": follows}
     return digest_of(content)[:DIGITS]

@@ -12,9 +12,9 @@ class Point:
     """Case with settings.
 
     Attributes:
-        settings: dotted key -> value, as text for ``--set``.
-        case: the resolved case.
-        digests: stage -> key of its product.
+        settings: Dotted key -> value, as text for ``--set``.
+        case: The resolved case.
+        digests: Stage -> key of its product.
     """
 
     settings: Mapping[str, str]

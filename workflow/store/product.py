@@ -26,8 +26,8 @@ def seal(folder: Path, record: dict) -> dict:
     """Write the record of a complete product and flush all its files to disk.
 
     Args:
-        folder: folder of the product.
-        record: results of the stage, without ``files``.
+        folder: Folder of the product.
+        record: Results of the stage, without ``files``.
 
     Returns:
         The record with ``files`` and the digest of the record itself.

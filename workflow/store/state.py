@@ -16,11 +16,11 @@ class StageState:
     """State of the product of a stage: whether the stage has to run, and why.
 
     Attributes:
-        stale: whether it has to run.
-        missing: whether the run folder contains no product of the stage, for any parameters.
-        changes: parameters of the stage whose values differ from the product in the run folder.
-        because_of: upstream stages that have to run, or whose products have changed since this stage read them.
-        damaged: messages about damaged or missing files of the product.
+        stale: Whether it has to run.
+        missing: Whether the run folder contains no product of the stage, for any parameters.
+        changes: Parameters of the stage whose values differ from the product in the run folder.
+        because_of: Upstream stages that have to run, or whose products have changed since this stage read them.
+        damaged: Messages about damaged or missing files of the product.
     """
 
     stale: bool
@@ -52,13 +52,13 @@ def _of_product(store: Store, point: Point, name: str, before: Mapping[str, Stag
         return StageState(stale=True, missing=False, damaged=damages)
     folders = {name: store.product(point, name) for name in point.case.pipeline.names}
     present = reads(folders, point.case, stage)
-    was = (store.record(point, name) or {}).get("reads", {})
-    redone = tuple(stage_name for stage_name in present if before[stage_name].stale)
-    changed = tuple(key for key in present if key not in redone and present[key] != was.get(key))
+    recorded = (store.record(point, name) or {}).get("reads", {})
+    rebuilt = tuple(stage_name for stage_name in present if before[stage_name].stale)
+    changed = tuple(key for key in present if key not in rebuilt and present[key] != recorded.get(key))
     if changed:
         return StageState(stale=True, missing=False, because_of=changed)
     # Whether the pads have changed can only be decided once the geometry has been rebuilt.
-    return StageState(stale=False, missing=False, because_of=() if stage.pads else redone)
+    return StageState(stale=False, missing=False, because_of=() if stage.pads else rebuilt)
 
 
 def _of_absence(point: Point, name: str, records: Mapping[str, dict], before: Mapping[str, StageState]) -> StageState:

@@ -15,7 +15,7 @@ from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import RECORD, SEAL, content_digest, discard, read_record
 
 HOME = ".store"  # in a run folder, or in the folder of a study
-AGAIN = 2  # repetitions of a cheap point, which exclude machine load and first compilation from its time
+REPETITIONS = 2  # of a cheap point, so that machine load and first compilation do not count
 CASE = "inputs/case.json"
 CASE_CHANGED = "was changed since it was written; `reflowshock run` with the case file writes it again"
 MESSAGE, TRACEBACK = "message.txt", "error.txt"  # in the partial folder of a failed stage
@@ -29,8 +29,8 @@ class Store:
     product is being made; the complete product is moved atomically, and checkpoints of a killed stage stay there.
 
     Attributes:
-        folder: folder of the run, study or accuracy test.
-        one_run: whether the folder itself is the run folder; otherwise each point has its own, ``points/<key>``.
+        folder: Folder of the run, study or accuracy test.
+        one_run: Whether the folder itself is the run folder; otherwise each point has its own, ``points/<key>``.
     """
 
     folder: Path
@@ -39,7 +39,7 @@ class Store:
     @property
     def repeated(self) -> "list[Store]":
         """Stores of the runs that a convergence study repeats for timing."""
-        return [Store(self.folder / f"again-{number}") for number in range(1, AGAIN + 1)]
+        return [Store(self.folder / f"again-{number}") for number in range(1, REPETITIONS + 1)]
 
     @property
     def home(self) -> Path:
@@ -112,9 +112,9 @@ def reads(products: Mapping[str, Path], case: Case, stage: Stage) -> dict[str, s
     If a stage reads only the pad table of the geometry, the digest covers only this table.
 
     Args:
-        products: stage -> folder of its product.
-        case: the case.
-        stage: stage that reads the products.
+        products: Stage -> folder of its product.
+        case: The case.
+        stage: Stage that reads the products.
     """
     digests: dict[str, str | None] = {}
     for name in case.pipeline.read_by(stage.name):

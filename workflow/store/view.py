@@ -31,29 +31,29 @@ def show(store: Store, point: Point, stages: Iterable[str]) -> list[str]:
     """Link the products of some stages of a point into its run folder and remove all other links.
 
     Args:
-        store: store of the products.
-        point: point of the run folder.
-        stages: stages whose products exist and are intact.
+        store: Store of the products.
+        point: Point of the run folder.
+        stages: Stages whose products exist and are intact.
 
     Returns:
         Names of files that were missing or modified in the run folder and have been restored.
     """
     folder = store.run_folder(point)
-    links = _wanted(store, point, set(stages))
-    before = listed(store, folder)
-    _make_way(folder, CASE)
+    links = _expected_links(store, point, set(stages))
+    before = list_program_files(store, folder)
+    _clear_path(folder, CASE)
     write_case(folder, point.case)
     for name, link in before.items():
         if links.get(name) != link:
-            _withdraw(store, folder, name, link)
+            _remove_link(store, folder, name, link)
     _write_list(store, folder, links)
-    lost = [name for name, link in links.items() if before.get(name) == link and not _holds(folder, name, link)]
+    restored = [name for name, link in links.items() if before.get(name) == link and not _is_intact(folder, name, link)]
     for name, link in links.items():
-        _put(store, folder, name, link)
-    return lost
+        _place_link(store, folder, name, link)
+    return restored
 
 
-def listed(store: Store, folder: Path) -> dict[str, Link]:
+def list_program_files(store: Store, folder: Path) -> dict[str, Link]:
     """Return the files of the program in a run folder, by name."""
     try:
         table = json.loads(_list(store, folder).read_text(encoding="utf-8"))
@@ -76,12 +76,12 @@ def _recognised(store: Store, folder: Path) -> dict[str, Link]:
         for name, digest in files.items():
             link = Link(f"products/{product.name}/{name}", digest)
             candidates += [(path, link) for path in (f"{stage}/{name}", *(page for page in PAGE if page == name))]
-    return {name: link for name, link in candidates if _holds(folder, name, link)}
+    return {name: link for name, link in candidates if _is_intact(folder, name, link)}
 
 
 def shown_records(store: Store, point: Point) -> dict[str, dict]:
     """Return the records of the products that a run folder links, by stage."""
-    sources = {name: link.source for name, link in listed(store, store.run_folder(point)).items()}
+    sources = {name: link.source for name, link in list_program_files(store, store.run_folder(point)).items()}
     source_by_stage = {stage.name: sources.get(stage.record) for stage in point.case.pipeline.stages}
     records = {name: read_record((store.home / source).parent) for name, source in source_by_stage.items() if source}
     return {name: record for name, record in records.items() if record is not None}
@@ -91,37 +91,37 @@ def adopt(store: Store, folder: Path, made: Path) -> None:
     """Move files that belong to no product to the top of a folder, replacing earlier files of this kind.
 
     Args:
-        store: store of the folder.
-        folder: folder of a run or study; files of the user with the same names are renamed.
-        made: folder that contains exactly the files to move.
+        store: Store of the folder.
+        folder: Folder of a run or study; files of the user with the same names are renamed.
+        made: Folder that contains exactly the files to move.
     """
     files = {path.name: path for path in made.iterdir()}
-    before = listed(store, folder)
+    before = list_program_files(store, folder)
     links = {name: Link(f"{NO_PRODUCT}/{name}", file_digest(path)) for name, path in files.items()}
     for name, link in list(before.items()):
         if name in links or link.source.startswith(NO_PRODUCT):
-            _withdraw(store, folder, name, before.pop(name))
+            _remove_link(store, folder, name, before.pop(name))
     _write_list(store, folder, before | links)
     for name, path in files.items():
-        if os.path.lexists(folder / name) and not _holds(folder, name, links[name]):
+        if os.path.lexists(folder / name) and not _is_intact(folder, name, links[name]):
             _set_aside(folder / name)
         path.rename(folder / name)
 
 
-def not_as_put(store: Store, folder: Path) -> list[str]:
+def altered_files(store: Store, folder: Path) -> list[str]:
     """List missing or modified files of the program in a run folder as messages."""
     return [
         f"{folder / name} {'was modified' if os.path.lexists(folder / name) else 'is missing'}"
-        for name, link in listed(store, folder).items()
-        if not _holds(folder, name, link)
+        for name, link in list_program_files(store, folder).items()
+        if not _is_intact(folder, name, link)
     ]
 
 
-def withdraw_all(store: Store) -> None:
+def remove_all_links(store: Store) -> None:
     """Remove all files of the program from the folders of a store, and then empty folders."""
     for folder in _folders(store):
-        for name, link in listed(store, folder).items():
-            _withdraw(store, folder, name, link)
+        for name, link in list_program_files(store, folder).items():
+            _remove_link(store, folder, name, link)
         if (folder / CASE).is_file() and not _is_behind_link(folder, CASE):
             (folder / CASE).unlink()
             _remove_empty(folder / CASE, store.folder)
@@ -129,7 +129,9 @@ def withdraw_all(store: Store) -> None:
 
 def remove_unused(store: Store) -> tuple[int, int]:
     """Remove products that no run folder links, and interrupted work; return the number of each."""
-    linked = {Path(link.source).parts[1] for folder in _folders(store) for link in listed(store, folder).values()}
+    linked = {
+        Path(link.source).parts[1] for folder in _folders(store) for link in list_program_files(store, folder).values()
+    }
     products = [path for path in (store.home / "products").glob("*") if path.name not in linked]
     works = list((store.home / "work").glob("*"))
     for path in products + works:
@@ -157,7 +159,7 @@ def _write_list(store: Store, folder: Path, links: dict[str, Link]) -> None:
     partial.replace(path)
 
 
-def _wanted(store: Store, point: Point, stages: set[str]) -> dict[str, Link]:
+def _expected_links(store: Store, point: Point, stages: set[str]) -> dict[str, Link]:
     """Return the links that a run folder should contain: one folder per stage, some files also at the top."""
     links = {}
     for stage in point.case.pipeline.stages:
@@ -175,11 +177,11 @@ def _wanted(store: Store, point: Point, stages: set[str]) -> dict[str, Link]:
     return links
 
 
-def _put(store: Store, folder: Path, name: str, link: Link) -> None:
+def _place_link(store: Store, folder: Path, name: str, link: Link) -> None:
     """Link a file of the store into a run folder; a user's file with the same name is renamed."""
-    if _holds(folder, name, link):
+    if _is_intact(folder, name, link):
         return
-    _make_way(folder, name)
+    _clear_path(folder, name)
     path, source = folder / name, store.home / link.source
     if os.path.lexists(path):
         _set_aside(path)
@@ -190,7 +192,7 @@ def _put(store: Store, folder: Path, name: str, link: Link) -> None:
         shutil.copy2(source, path)
 
 
-def _make_way(folder: Path, name: str) -> None:
+def _clear_path(folder: Path, name: str) -> None:
     """Rename files and links that occupy the parent folders of a file, or a folder with its name."""
     for parent in reversed(_parents(name)):
         path = folder / parent
@@ -200,10 +202,10 @@ def _make_way(folder: Path, name: str) -> None:
         _set_aside(folder / name)
 
 
-def _withdraw(store: Store, folder: Path, name: str, link: Link) -> None:
+def _remove_link(store: Store, folder: Path, name: str, link: Link) -> None:
     """Remove a file of the program; a file that the user has replaced or modified stays."""
     path = folder / name
-    if _holds(folder, name, link):
+    if _is_intact(folder, name, link):
         path.unlink()
         _remove_empty(path, store.folder)
     elif not _is_behind_link(folder, name) and _same(path, store.home / link.source):
@@ -227,9 +229,9 @@ def _set_aside(path: Path) -> None:
     path.rename(aside)
 
 
-def _holds(folder: Path, name: str, link: Link) -> bool:
+def _is_intact(folder: Path, name: str, link: Link) -> bool:
     """Return whether an unmodified file of the program has this name; files behind a link do not count."""
-    return not _is_behind_link(folder, name) and _shows(folder / name, link)
+    return not _is_behind_link(folder, name) and _matches(folder / name, link)
 
 
 def _is_behind_link(folder: Path, name: str) -> bool:
@@ -250,7 +252,7 @@ def _same(path: Path, source: Path) -> bool:
         return False
 
 
-def _shows(path: Path, link: Link) -> bool:
+def _matches(path: Path, link: Link) -> bool:
     """Return whether a path is a file with the digest of a link."""
     try:
         return not path.is_symlink() and path.is_file() and file_digest(path) == link.digest

@@ -9,11 +9,11 @@ from reflowshock.cases.hard.hard_case import HardCase, read_hard_cases
 from reflowshock.cases.hard.random_cases import read_random_file, shares
 from reflowshock.cases.hard.trial import FAMILIES
 from reflowshock.cases.hard.verdict import Verdict
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 from reflowshock.problem import Problem
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.process.terminal import console
-from reflowshock.workflow.store.folders import locked
+from reflowshock.workflow.store.folders import lock_folder
 from reflowshock.workflow.stress_test.page import write_results
 from reflowshock.workflow.stress_test.sample import Sample
 from reflowshock.workflow.stress_test.session import Session
@@ -27,12 +27,12 @@ class Request:
     """Options of a stress test.
 
     Attributes:
-        files: files of hard cases; empty for all shipped files.
-        families: families to run; empty for all.
-        count: number of random cases in all families together.
-        seed: seed of the random cases.
-        cores: number of simultaneous cases.
-        out: output folder.
+        files: Files of hard cases; empty for all shipped files.
+        families: Families to run; empty for all.
+        count: Number of random cases in all families together.
+        seed: Seed of the random cases.
+        cores: Number of simultaneous cases.
+        out: Output folder.
     """
 
     files: Sequence[Path]
@@ -50,8 +50,8 @@ def stress_test(request: Request) -> bool:
         Whether all cases stay within their bounds.
 
     Raises:
-        CaseError: a case is invalid or results cannot be written; raised before any case runs.
-        RunFolderBusy: another stress test uses the output folder.
+        CaseError: A case is invalid or results cannot be written; raised before any case runs.
+        RunFolderBusy: Another stress test uses the output folder.
     """
     families = _families(request.families)
     fixed = {path: read_hard_cases(path) for path in _files(request.files) if read_random_file(path) is None}
@@ -59,7 +59,7 @@ def stress_test(request: Request) -> bool:
     samples = list(_samples(request, families))
     if not fixed and not samples:
         raise CaseError("stress-test", [Problem("", "no case to run", None, "families " + ", ".join(FAMILIES))])
-    with locked(request.out, "stress test", "hard cases"):
+    with lock_folder(request.out, "stress test", "hard cases"):
         verdicts = _try_all(request, fixed, samples)
         show_table(verdicts, samples)
         write_results(request.out, verdicts, samples, request.seed)
@@ -78,8 +78,8 @@ def _try_all(request: Request, fixed: Mapping[Path, list[HardCase]], samples: Se
             show_verdict(verdict)
             return
         sample = by_name[verdict.case.name]
-        sample.found.append(verdict)
-        if len(sample.found) == len(sample.cases):
+        sample.completed.append(verdict)
+        if len(sample.completed) == len(sample.cases):
             show_sample(sample)
 
     session = Session(request.cores, request.seed, {sample.name: len(sample.cases) for sample in samples})
@@ -109,6 +109,6 @@ def _samples(request: Request, families: Sequence[str]) -> Iterator[Sample]:
 def _families(names: Sequence[str]) -> list[str]:
     for family in names:
         if family not in FAMILIES:
-            choice, hint = "one of " + ", ".join(FAMILIES), nearest(family, FAMILIES)
+            choice, hint = "one of " + ", ".join(FAMILIES), find_nearest(family, FAMILIES)
             raise CaseError("stress-test", [Problem("--family", "unknown family", family, choice, hint)])
     return [family for family in FAMILIES if not names or family in names]

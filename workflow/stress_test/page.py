@@ -21,7 +21,7 @@ from reflowshock.workflow import __version__
 from reflowshock.workflow.report.drawing import STYLE
 from reflowshock.workflow.report.template import template_environment
 from reflowshock.workflow.stress_test.sample import Sample
-from reflowshock.workflow.stress_test.words import sample_said
+from reflowshock.workflow.stress_test.words import sample_summary
 
 TEMPLATES = Path(__file__).parent / "templates"
 LEAST, MOST = 0.05, 1000.0  # margins outside are drawn at the edge
@@ -33,10 +33,10 @@ def write_results(folder: Path, verdicts: Sequence[Verdict], samples: Sequence[S
     """Write all results to a folder; counterexamples of earlier tests stay.
 
     Args:
-        folder: output folder.
-        verdicts: verdicts on the fixed cases.
-        samples: random cases.
-        seed: seed of the random cases.
+        folder: Output folder.
+        verdicts: Verdicts on the fixed cases.
+        samples: Random cases.
+        seed: Seed of the random cases.
     """
     folder.mkdir(parents=True, exist_ok=True)
     for sample in samples:
@@ -86,7 +86,7 @@ def _sample_record(sample: Sample) -> dict[str, Any]:
 
 def _page(folder: Path, verdicts: Sequence[Verdict], samples: Sequence[Sample], seed: int) -> str:
     environment = template_environment(TEMPLATES)
-    environment.globals.update(sample_said=sample_said)
+    environment.globals.update(sample_summary=sample_summary)
     in_order = sorted(verdicts, key=lambda verdict: (FAMILIES.index(verdict.case.family), verdict.case.name))
     return environment.get_template("stress_test.html.j2").render(
         version=__version__,
@@ -104,9 +104,9 @@ def draw_margins(path: Path, verdicts: Sequence[Verdict], samples: Sequence[Samp
     """Draw the margins of all cases to a PNG file.
 
     Args:
-        path: path of the PNG file.
-        verdicts: verdicts on the fixed cases.
-        samples: random cases, one row per sample with one dot per case.
+        path: Path of the PNG file.
+        verdicts: Verdicts on the fixed cases.
+        samples: Random cases, one row per sample with one dot per case.
     """
     rows = _rows(verdicts, samples)
     with pyplot.rc_context(STYLE | {"font.size": 8}):

@@ -15,15 +15,15 @@ class Sample:
     """Random cases of one file.
 
     Attributes:
-        file: file that defines the distribution.
-        cases: cases in the order of drawing.
-        found: verdicts in the order of completion.
-        simplest: simplest counterexample as the table of a file; None without one.
+        file: File that defines the distribution.
+        cases: Cases in the order of drawing.
+        completed: Verdicts in the order of completion.
+        simplest: Simplest counterexample as the table of a file; None without one.
     """
 
     file: RandomFile
     cases: list[HardCase]
-    found: list[Verdict] = field(default_factory=list)
+    completed: list[Verdict] = field(default_factory=list)
     simplest: dict[str, Any] | None = None
 
     @property
@@ -39,7 +39,7 @@ class Sample:
     @property
     def verdicts(self) -> list[Verdict]:
         """Verdicts in the order of the cases."""
-        return sorted(self.found, key=lambda verdict: self.cases.index(verdict.case))
+        return sorted(self.completed, key=lambda verdict: self.cases.index(verdict.case))
 
     @property
     def missed(self) -> list[Verdict]:
@@ -49,12 +49,12 @@ class Sample:
     @property
     def refused(self) -> int:
         """Number of cases refused with a message."""
-        return sum(verdict.is_refused for verdict in self.found)
+        return sum(verdict.is_refused for verdict in self.completed)
 
     @property
     def too_many_refused(self) -> bool:
         """Whether more than the share ``MOST_REFUSED`` was refused."""
-        return self.refused > MOST_REFUSED * len(self.found)
+        return self.refused > MOST_REFUSED * len(self.completed)
 
     @property
     def ok(self) -> bool:
@@ -64,5 +64,5 @@ class Sample:
     @property
     def closest(self) -> Check | None:
         """Check with the smallest margin of all cases."""
-        checks = [verdict.closest for verdict in self.found if verdict.closest is not None]
+        checks = [verdict.closest for verdict in self.completed if verdict.closest is not None]
         return min(checks, key=lambda check: check.rank, default=None)

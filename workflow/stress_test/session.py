@@ -32,9 +32,9 @@ class Report:
     """Outcome of a test.
 
     Attributes:
-        properties: properties recorded by the test.
-        seconds: time since the start of the test [s].
-        code: exit code of its worker; None if the worker goes on.
+        properties: Properties recorded by the test.
+        seconds: Time since the start of the test [s].
+        code: Exit code of its worker; None if the worker goes on.
     """
 
     properties: Mapping[str, Any]
@@ -100,9 +100,9 @@ class Session:
     """Settings of a pytest session for hard cases.
 
     Attributes:
-        cores: number of workers.
-        seed: seed of the random cases.
-        counts: numbers of random cases by file name.
+        cores: Number of workers.
+        seed: Seed of the random cases.
+        counts: Numbers of random cases by file name.
     """
 
     cores: int
@@ -125,7 +125,7 @@ class Session:
         """Search for the simplest counterexample of random files.
 
         Args:
-            missed: number of a missed case, by file.
+            missed: Number of a missed case, by file.
 
         Returns:
             Table of parameters by file name, without files whose search was interrupted.
@@ -145,8 +145,8 @@ class Session:
         """Run pytest without the user's configuration and return its exit code.
 
         Raises:
-            KeyboardInterrupt: the session was interrupted.
-            RuntimeError: a worker could not read the cases.
+            KeyboardInterrupt: The session was interrupted.
+            RuntimeError: A worker could not read the cases.
         """
         arguments = ["-c", os.devnull, "--rootdir=/", "--noconftest", "-p", "no:cacheprovider"]
         arguments += [part for plugin in PLUGINS for part in ("-p", plugin)]

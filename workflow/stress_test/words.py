@@ -7,21 +7,21 @@ from rich.text import Text
 
 from reflowshock.cases.hard.trial import FAMILIES
 from reflowshock.cases.hard.verdict import Verdict
-from reflowshock.workflow.process.terminal import console, styled
+from reflowshock.workflow.process.terminal import console, style_text
 from reflowshock.workflow.stress_test.sample import MOST_REFUSED, Sample
 
 
 def show_verdict(verdict: Verdict) -> None:
     """Print one verdict: case, closest bound, measured value, margin."""
-    line = styled(" {}  {}  {} s", named(verdict), str(verdict), f"{verdict.seconds:.1f}")
+    line = style_text(" {}  {}  {} s", name_case(verdict), str(verdict), f"{verdict.seconds:.1f}")
     console.print(_mark(verdict.ok) + line, soft_wrap=True)
 
 
 def _mark(ok: bool) -> Text:
-    return styled("[green]ok  [/]" if ok else "[bold red]MISS[/]")
+    return style_text("[green]ok  [/]" if ok else "[bold red]MISS[/]")
 
 
-def named(verdict: Verdict) -> str:
+def name_case(verdict: Verdict) -> str:
     """Return the name of a case with its varied values."""
     return verdict.case.name + (f" ({verdict.case.tried})" if verdict.case.tried else "")
 
@@ -29,13 +29,13 @@ def named(verdict: Verdict) -> str:
 def show_sample(sample: Sample) -> None:
     """Print the results of the random cases of a trial and its missed cases."""
     seconds = f"{sum(verdict.seconds for verdict in sample.verdicts):.1f}"
-    line = styled(" {}  {}  {} s", sample.name, sample_said(sample), seconds)
+    line = style_text(" {}  {}  {} s", sample.name, sample_summary(sample), seconds)
     console.print(_mark(sample.ok) + line, soft_wrap=True)
     for verdict in sample.missed:
-        console.print(f"     {named(verdict)}  {verdict!s}", soft_wrap=True)
+        console.print(f"     {name_case(verdict)}  {verdict!s}", soft_wrap=True)
 
 
-def sample_said(sample: Sample) -> str:
+def sample_summary(sample: Sample) -> str:
     """Return a summary of the random cases of a trial."""
     counts = f"{len(sample.verdicts)} tried, {sample.refused} refused, {len(sample.missed)} missed"
     if sample.too_many_refused:
@@ -66,4 +66,4 @@ def _least(verdicts: Sequence[Verdict]) -> tuple[str, str]:
     if not pairs:
         return "", ""
     check, verdict = min(pairs, key=lambda pair: pair[0].rank)
-    return check.margin_text, named(verdict)
+    return check.margin_text, name_case(verdict)

@@ -27,7 +27,11 @@ Arrays = Mapping[str, NDArray]
 
 
 def of_mesh(elements: Mapping[str, int]) -> Findings:
-    """Return the numbers of elements of the layers as metrics."""
+    """Return the numbers of elements of the layers as metrics.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
+    """
     counts = {f"elements_{layer}": metric(count) for layer, count in elements.items()}
     return Findings(metrics=counts | {"elements": metric(sum(elements.values()))})
 
@@ -36,6 +40,9 @@ def of_motion(results: Mapping[str, dict]) -> Findings:
     """Collect metrics and health checks from the ``result.json`` of each solver.
 
     Names of all solvers but the first get the solver as a prefix.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
     """
     metrics: dict = {}
     health: dict = {}
@@ -53,6 +60,9 @@ def of_comparison(case: StructureCase, folders: Mapping[str, Path]) -> Findings:
     Args:
         case: Case of a structure.
         folders: Folder with the products of each solver; the first solver gives the main metrics.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
     """
     from reflowshock.fem.output.compare_structures import solver_differences
 
@@ -201,7 +211,11 @@ def layers_of(case: StructureCase) -> exact_layers.Layers:
 
 
 def truncated_waves(case: StructureCase) -> Iterator[Problem]:
-    """Yield a problem for each layered bar whose compared waves have not half passed at the end of the run."""
+    """Yield a problem for each layered bar whose compared waves have not half passed at the end of the run.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     for key, reference in case.references.items():
         if reference.kind == "layered_bar":
             roles = zip(("near", "far", "beyond"), [*reference.incident, reference.transmitted], strict=True)

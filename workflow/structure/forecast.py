@@ -126,7 +126,11 @@ def forecast_steps(case: StructureCase, layers: Mapping[str, LayerForecast]) -> 
 
 
 def step_problems(case: StructureCase) -> Iterator[Problem]:
-    """Yield problems of time steps: undefined, too many, above the critical step, or windows longer than a pulse."""
+    """Yield problems of time steps: undefined, too many, above the critical step, or windows longer than a pulse.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     import numpy as np
 
     try:
@@ -152,7 +156,11 @@ def step_problems(case: StructureCase) -> Iterator[Problem]:
 
 
 def shorter_than_window(case: StructureCase, window: float) -> Iterator[Problem]:
-    """Yield problems of pulses that are shorter than the coupling window [s]."""
+    """Yield problems of pulses that are shorter than the coupling window [s].
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     from reflowshock.fem.loads.structure_pulses import pulse_durations, pulses_of
 
     for name, pulse in pulses_of(case.loads).items():

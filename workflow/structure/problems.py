@@ -8,7 +8,11 @@ from reflowshock.workflow.structure.references import reference_problems
 
 
 def structure_problems(case: StructureCase) -> list[Problem]:
-    """Check materials, positions, facet sets, loads, references and time steps of a structure against each other."""
+    """Check materials, positions, facet sets, loads, references and time steps of a structure against each other.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
+    """
     from reflowshock.fem.problem import structure_checks
     from reflowshock.meshing.board.box_plan import box_problems
     from reflowshock.workflow.structure.findings import truncated_waves

@@ -15,14 +15,14 @@ from reflowshock.workflow.structure.references import Record
 def recorded_acceleration(case: StructureCase, reference: Record, end: float):
     """Return a recorded acceleration as an ``Acceleration``, filtered like the run and cut at its end [s]."""
     from reflowshock.fem.loads.pulse_table import read_pulse
-    from reflowshock.fem.output.acceleration import Acceleration, low_passed
+    from reflowshock.fem.output.acceleration import Acceleration, apply_low_pass
 
     pulse = read_pulse(Path(reference.table), "acceleration", reference.table_column)
     step = float(np.diff(pulse.times).min())
     times = np.arange(int(pulse.times[-1] / step) + 1) * step
     values = np.interp(times, pulse.times, pulse.values)
     within = times <= end
-    return Acceleration(times[within], values[within], low_passed(values, step, case.dynamics.filter)[within])
+    return Acceleration(times[within], values[within], apply_low_pass(values, step, case.dynamics.filter)[within])
 
 
 def compare_with_record(case: StructureCase, reference: Record, history: Mapping[str, NDArray]) -> dict[str, Any]:

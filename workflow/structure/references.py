@@ -144,7 +144,11 @@ AnyReference = Annotated[
 
 
 def reference_problems(references: dict[str, AnyReference], problem: StructureProblem) -> Iterator[Problem]:
-    """Yield the problems of all references with loads, watch points, modes and layers of the case."""
+    """Yield the problems of all references with loads, watch points, modes and layers of the case.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
+    """
     for name, reference in references.items():
         yield from reference.problems(f"references.{name}", problem)
 

@@ -47,7 +47,15 @@ def read_results(folder: Path) -> dict[str, dict]:
 
 
 def geometry(run: Run[StructureCase], folder: Path) -> Findings:
-    """Mesh the layers."""
+    """Mesh the layers.
+
+    Args:
+        run: Case, cores, and run folder from which the products of earlier stages are read.
+        folder: Folder into which the products of the stage are written.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
+    """
     from reflowshock.meshing.board.box import write_box
     from reflowshock.meshing.core.preview import write_layers_preview
 
@@ -57,14 +65,30 @@ def geometry(run: Run[StructureCase], folder: Path) -> Findings:
 
 
 def shock(run: Run[StructureCase], folder: Path) -> Findings:
-    """Compute the motion, one MPI run of the package ``fem`` for each solver."""
+    """Compute the motion, one MPI run of the package ``fem`` for each solver.
+
+    Args:
+        run: Case, cores, and run folder from which the products of earlier stages are read.
+        folder: Folder into which the products of the stage are written.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
+    """
     for solver in run.case.dynamics.solvers:
         run_solver(run, folder / solver, solver)
     return structure_findings.of_motion(read_results(folder))
 
 
 def comparison(run: Run[StructureCase], folder: Path) -> Findings:
-    """Compare the motion with the references of the case, and the solvers with each other."""
+    """Compare the motion with the references of the case, and the solvers with each other.
+
+    Args:
+        run: Case, cores, and run folder from which the products of earlier stages are read.
+        folder: Folder into which the products of the stage are written.
+
+    Returns:
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
+    """
     result = structure_findings.of_comparison(run.case, solver_folders(run.folder / "shock"))
     write_json(folder / "comparison.json", result.metrics)
     return result

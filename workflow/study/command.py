@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from reflowshock.names import nearest
+from reflowshock.names import find_nearest
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.text import duration
-from reflowshock.workflow.jobs.batch import Machine, missing, run_points, show_products
+from reflowshock.workflow.jobs.batch import Machine, list_missing, run_points, show_products
 from reflowshock.workflow.pipeline.points import PointsError, read_possible_points
 from reflowshock.workflow.process.terminal import console, new_table, print_error, progress_bar, text_table
-from reflowshock.workflow.store.folders import locked
+from reflowshock.workflow.store.folders import lock_folder
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import discard
 from reflowshock.workflow.store.store import Store
@@ -67,7 +67,7 @@ def read_points_of(path: Path, oversubscribe: bool = False, force: bool = False)
 def show_forecast(points: Points, store: Store) -> None:
     """Print the products to compute with their predicted cost."""
     possible = list(points.possible.values())
-    stages = forecast_stages(possible, missing(store, possible, LAST))
+    stages = forecast_stages(possible, list_missing(store, possible, LAST))
     table = new_table(
         f"{points.study.about.name}: {len(possible)} points, in {store.folder}",
         "stage",
@@ -98,7 +98,7 @@ def show_forecast(points: Points, store: Store) -> None:
 def predicted_study_seconds(points: Points, store: Store) -> float:
     """Predict the total wall time [s] of the missing products of a study, computed one after the other."""
     possible = list(points.possible.values())
-    return sum(stage.seconds or 0.0 for stage in forecast_stages(possible, missing(store, possible, LAST)))
+    return sum(stage.seconds or 0.0 for stage in forecast_stages(possible, list_missing(store, possible, LAST)))
 
 
 def run_study(points: Points, store: Store, machine: Machine, *, force: bool = False) -> bool:
@@ -118,8 +118,8 @@ def run_study(points: Points, store: Store, machine: Machine, *, force: bool = F
         RunFolderBusy: Another process uses the folder.
     """
     possible, about = list(points.possible.values()), points.study.about
-    with locked(store.folder, CONTENT, about.name, force) as lock:
-        jobs = missing(store, possible, LAST)
+    with lock_folder(store.folder, CONTENT, about.name, force) as lock:
+        jobs = list_missing(store, possible, LAST)
         if jobs:
             with progress_bar(f"{about.name}: {len(jobs)} products to compute") as bar:
                 report = progress_reporter(store, possible, jobs, bar, partial(warn_of_metrics, points, store))
@@ -166,7 +166,7 @@ def warn_of_metrics(points: Points, store: Store, first: Point) -> None:
     available = _metrics_of(points.study, [row])
     for name in points.study.metrics:
         if name not in available:
-            hint = nearest(name, sorted(available))
+            hint = find_nearest(name, sorted(available))
             suggestion = f"; did you mean {hint}?" if hint else "."
             print_error(
                 f"the first point has no {_required_type(points.study, name)}metric {name}{suggestion} "
@@ -182,7 +182,7 @@ def has_metrics(study: Study, rows: Sequence[Row]) -> bool:
     available = _metrics_of(study, rows)
     unavailable = [name for name in study.metrics if available and name not in available]
     for name in unavailable:
-        hint = nearest(name, sorted(available))
+        hint = find_nearest(name, sorted(available))
         print_error(
             f"no point has a {_required_type(study, name)}metric {name}" + (f"; did you mean {hint}?" if hint else "")
         )

@@ -71,7 +71,7 @@ class MainEffect:
         return max(means) - min(means)
 
 
-def measured(rows: Sequence[Row], metric: str) -> list[Row]:
+def select_measured(rows: Sequence[Row], metric: str) -> list[Row]:
     """Return the rows in which a metric is a number."""
     return [row for row in rows if is_number(row.metrics.get(metric, {"value": None})["value"])]
 
@@ -98,13 +98,13 @@ def effect_of(factor: Factor, rows: Sequence[Row], metric: str) -> MainEffect:
     if ordered and len(set(values)) > 1 and np.ptp(metrics) > 0.0 and len(rows) > 2:
         result = spearmanr(np.array(values, dtype=float), metrics)
         correlation, probability = float(result.statistic), float(result.pvalue)
-    named = tuple(value if isinstance(value, float) else str(value) for value in values)
-    return MainEffect(factor, unit, named, metrics, correlation, probability)
+    labels = tuple(value if isinstance(value, float) else str(value) for value in values)
+    return MainEffect(factor, unit, labels, metrics, correlation, probability)
 
 
-def ranked(rows: Sequence[Row], metric: str, goal: str) -> list[Row]:
+def rank_parameters(rows: Sequence[Row], metric: str, goal: str) -> list[Row]:
     """Return the healthy rows in which a metric is a number, the best first; the goal is "minimise" or "maximise"."""
     from reflowshock.workflow.study.results import HEALTHY
 
-    healthy = [row for row in measured(rows, metric) if row.verdict == HEALTHY]
+    healthy = [row for row in select_measured(rows, metric) if row.verdict == HEALTHY]
     return sorted(healthy, key=lambda row: row.metrics[metric]["value"], reverse=goal == "maximise")

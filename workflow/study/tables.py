@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 
 from reflowshock.workflow.case.text import quantity
-from reflowshock.workflow.study.main_effects import MainEffect, effect_of, measured, ranked
+from reflowshock.workflow.study.main_effects import MainEffect, effect_of, rank_parameters, select_measured
 from reflowshock.workflow.study.results import HEALTHY, UNHEALTHY, Row
 from reflowshock.workflow.study.study_file import Study
 
@@ -25,7 +25,7 @@ def ranking(study: Study, rows: Sequence[Row]) -> dict:
                 *(row.settings[key] for key in keys),
                 *(quantity(row.metrics[name]) if name in row.metrics else "–" for name in metrics),
             ]
-            for rank, row in enumerate(ranked(rows, study.about.rank_by, study.about.goal), start=1)
+            for rank, row in enumerate(rank_parameters(rows, study.about.rank_by, study.about.goal), start=1)
         ],
     }
 
@@ -35,7 +35,7 @@ def effects(study: Study, rows: Sequence[Row]) -> list[tuple[str, str, list[Main
     return [
         (name, numeric[0].metrics[name]["unit"], [effect_of(factor, numeric, name) for factor in study.design.factors])
         for name in study.metrics
-        if (numeric := measured(rows, name))
+        if (numeric := select_measured(rows, name))
     ]
 
 

@@ -9,7 +9,7 @@ from reflowshock.fem.elements.element import Elements
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.mesh.mesh import MeshData
-from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, RankElements, make_body, make_rank_elements
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.materials.library import FR4
@@ -26,16 +26,17 @@ SOLDER = Isotropic(
 LINEAR_HARDENING = SOLDER.model_copy(update={"plasticity": JohnsonCook(A=40e6, B=500e6, n=1.0)})
 
 
-def dns_pieces(mesh: MeshData, materials: Materials) -> tuple[Pieces, Tables]:
+def dns_elements(mesh: MeshData, materials: Materials) -> tuple[RankElements, Tables]:
     """Return the elements of all parts on one rank."""
     item = prepare(mesh, "dns")["dns"]
-    return make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials), item.tables
+    return make_rank_elements(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials), item.tables
 
 
 def dns_body(mesh: MeshData, board=FR4, materials: Materials | None = None) -> tuple[Body, float]:
     """Return a body of all parts and its smallest critical element step [s]; ``materials`` override ``board``."""
-    pieces, tables = dns_pieces(mesh, materials or ELASTIC.model_copy(update={"board": board}))
-    return make_body(MPI.COMM_SELF, pieces, tables, np.ones(len(pieces.steps))), float(pieces.steps.min())
+    rank_elements, tables = dns_elements(mesh, materials or ELASTIC.model_copy(update={"board": board}))
+    body = make_body(MPI.COMM_SELF, rank_elements, tables, np.ones(len(rank_elements.steps)))
+    return body, float(rank_elements.steps.min())
 
 
 def motion_of(body: Body, step: float, loads=(), held=()) -> ExplicitMotion:
@@ -62,5 +63,6 @@ def nonlinear_body(
     """Return a body of one material and its smallest critical element step [s]."""
     item = prepare(mesh, "dns")["dns"]
     materials = dict.fromkeys(item.tables.part_names, material)
-    pieces = make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials, formulation)
-    return make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)), response), pieces.steps.min()
+    rank_elements = make_rank_elements(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials, formulation)
+    body = make_body(MPI.COMM_SELF, rank_elements, item.tables, np.ones(len(rank_elements.steps)), response)
+    return body, rank_elements.steps.min()

@@ -14,7 +14,7 @@ from reflowshock.fem.coupling.scheme import Scheme
 from reflowshock.fem.division.checks import check_division
 from reflowshock.fem.division.divide import divide
 from reflowshock.fem.division.division import Division, Rules
-from reflowshock.fem.division.tables import ModelInput, Tables, joined, model_inputs
+from reflowshock.fem.division.tables import ModelInput, Tables, join_meshes, model_inputs
 from reflowshock.fem.division.whole import Survey, Treatment, Whole, survey
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.dynamics.energy_balance import ENERGIES, energy_sums
@@ -23,7 +23,7 @@ from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.tie import net_load
-from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, RankElements, make_body, make_rank_elements
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.communicators import Role
 from reflowshock.fem.parallel.exchange import InterfaceChannels
@@ -44,7 +44,7 @@ def surveyed(
     coupling: Coupling = HELD,
 ) -> tuple[Whole, Survey, Rules]:
     """Return a mesh, its survey, and division rules with coarse boards."""
-    whole = joined(mesh)
+    whole = join_meshes(mesh)
     coarse = whole.mesh.in_parts(lambda name: role_of_part(name) == "board")
     rules = Rules(coupling, coarse, fraction, 0.0, DURATION, 1, pushed=False)
     return whole, survey(whole.mesh, materials, Treatment()), rules
@@ -61,9 +61,9 @@ MANY = 1e5  # weight of each element in cost estimates, so that step levels pay 
 
 
 class Models(NamedTuple):
-    """Pieces and tables of each divided model."""
+    """Elements and tables of each divided model."""
 
-    parts: dict[Role, tuple[Pieces, Tables]]
+    parts: dict[Role, tuple[RankElements, Tables]]
     division: Division
 
     def bodies(self) -> dict[Role, Body]:
@@ -82,12 +82,12 @@ def models_of(
     whole, survey_of_mesh, rules = surveyed(mesh, materials, fraction, coupling)
     divided = division(whole, replace(survey_of_mesh, cost=MANY * survey_of_mesh.cost), rules)
     inputs = model_inputs(whole, divided)
-    return Models({role: pieces_of(item, materials) for role, item in inputs.items()}, divided)
+    return Models({role: rank_elements_of(item, materials) for role, item in inputs.items()}, divided)
 
 
-def pieces_of(item: ModelInput, materials: Materials) -> tuple[Pieces, Tables]:
+def rank_elements_of(item: ModelInput, materials: Materials) -> tuple[RankElements, Tables]:
     """Return the elements and tables of one model on this rank."""
-    return make_pieces(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials), item.tables
+    return make_rank_elements(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials), item.tables
 
 
 class Turn(Participant, Protocol):

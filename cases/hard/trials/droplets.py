@@ -8,9 +8,10 @@ from pydantic import Field, model_validator
 
 from reflowshock.arrays import Floats
 from reflowshock.cases.hard.trial import Trial, pure_trial
-from reflowshock.parameters import Parameters, changed
+from reflowshock.parameters import Parameters, with_value
 from reflowshock.particles.flows.dam_break import DamBreak
 from reflowshock.particles.flows.droplet import Droplet, cap
+from reflowshock.particles.flows.flow_effects import sph_sound
 from reflowshock.particles.flows.printing import Printing
 from reflowshock.quantity import Quantity
 
@@ -174,7 +175,7 @@ def droplets(parameters: DropletTrial) -> "Simulation":
         gap = 0.5 * EDGE * simulation.law.spacing
         aside = np.array([0.5 * (np.ptp(corners[:, 0])) + gap, 0.5 * parameters.offset * scene.diameter, 0.0])
         both = np.concatenate((points - aside[:, None], points + aside[:, None]), axis=1)
-        fields = flow.liquid_and_walls(both, np.empty((3, 0)), np.zeros(both.shape[1]), simulation.law)
+        fields = flow.make_fields(both, np.empty((3, 0)), np.zeros(both.shape[1]), simulation.law)
         fields.u[:] = parameters.approach * np.repeat([1.0, -1.0], points.shape[1])
         fields.w[:] = -scene.impact_speed
         surface.mesh.points = corners - aside
@@ -204,13 +205,13 @@ def _shape(parameters: DropletTrial, history: dict[str, Floats], metrics: dict[s
 def _outside(simulation: "Simulation") -> float:
     """Return the share of particles more than ``OUTSIDE`` outside their surface."""
     from reflowshock.particles.surface.cloud_level_set import with_mirror_image
-    from reflowshock.particles.surface.level_set import depths
+    from reflowshock.particles.surface.level_set import measure_depths
 
     surface = simulation.surface
     assert surface is not None
     closed = surface.points, surface.triangles
     closed = with_mirror_image(*closed) if simulation.law.mirror else closed
-    inside = depths(np.stack(simulation.fields[:3], axis=1), *closed)
+    inside = measure_depths(np.stack(simulation.fields[:3], axis=1), *closed)
     return float((inside < -OUTSIDE * simulation.law.spacing).mean())
 
 
@@ -218,7 +219,7 @@ def tank(parameters: TankTrial) -> dict[str, float]:
     """Run a column in a tank; noise is the deviation from hydrostatic pressure over rho g H."""
     measures, noise = _tank(parameters)
     if parameters.undiffused:
-        rough = changed(parameters, "dam_break.numerics.density_diffusion", 0.0)
+        rough = with_value(parameters, "dam_break.numerics.density_diffusion", 0.0)
         measures["noise_gain"] = _tank(rough)[1] / noise
     return measures
 
@@ -266,7 +267,7 @@ def printed(parameters: PrintTrial) -> dict[str, float]:
     names = ("volume_error", "volume_drift", "connected_parts_max", "mergers", "splits", "voids", "steps")
     return {
         **{name: result.metrics[name][0] for name in names},
-        "mach": result.history["largest_speed"].max() / scene.sound,
+        "mach": result.history["largest_speed"].max() / sph_sound(scene),
         "closest": nearest.min() / scene.spacing,
         "farthest": nearest.max() / scene.spacing,
         "below_wall": float((points[:, 2] < 0.0).sum()),

@@ -17,7 +17,7 @@ from reflowshock.fem.elements.stress import element_stress, symmetric
 from reflowshock.fem.forces.force import linear_terms
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.mesh.mesh import MeshData, append, boundary_facets
-from reflowshock.fem.model.assembly import make_body, make_pieces
+from reflowshock.fem.model.assembly import make_body, make_rank_elements
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.materials.roles import Materials
@@ -180,13 +180,13 @@ def body_of_blocks(parameters: Tied) -> Body:
     """Return both blocks as one body with the program's own tie and its checks."""
     item = prepare(append(blocks(parameters)), "dns")["dns"]
     soft = laminate(0.0, young=YOUNG / parameters.contrast)
-    pieces = make_pieces(
+    rank_elements = make_rank_elements(
         distribute(MPI.COMM_SELF, item.mesh),
         item.tables,
         Materials(board=laminate(0.0), substrate=soft),
         parameters.element,
     )
-    return make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)))
+    return make_body(MPI.COMM_SELF, rank_elements, item.tables, np.ones(len(rank_elements.steps)))
 
 
 def blocks(parameters: Tied) -> list[MeshData]:

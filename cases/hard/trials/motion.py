@@ -21,7 +21,7 @@ from reflowshock.fem.loads.load import BodyAcceleration, Load
 from reflowshock.fem.loads.pulse import Constant, HalfSine, Haversine, Pulse, Tabulated
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.mesh.tie import net_load
-from reflowshock.fem.model.assembly import ForceOptions, Pieces, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, RankElements, make_body, make_rank_elements
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.power_iteration import highest_frequency
 from reflowshock.fem.model.steps import mass_factor
@@ -44,17 +44,17 @@ def flight(parameters: Flight) -> dict[str, float]:
     Raises:
         EnergyError: If the step exceeds the critical one or energies do not balance.
     """
-    pieces, tables = pieces_of(parameters)
-    target = float(pieces.steps[pieces.roles != "copper"].min())
-    factor = mass_factor(pieces, ("copper",) if parameters.mass_scaled else (), target)
-    element = float((pieces.steps * np.sqrt(factor)).min())
-    linear = make_body(MPI.COMM_SELF, pieces, tables, factor, None)
+    rank_elements, tables = rank_elements_of(parameters)
+    target = float(rank_elements.steps[rank_elements.roles != "copper"].min())
+    factor = mass_factor(rank_elements, ("copper",) if parameters.mass_scaled else (), target)
+    element = float((rank_elements.steps * np.sqrt(factor)).min())
+    linear = make_body(MPI.COMM_SELF, rank_elements, tables, factor, None)
     assembled = highest_frequency(MPI.COMM_SELF, linear, linear.terms, linear.mass).critical_step
     plain = element if parameters.critical_step == "element" else assembled
     stiffness = parameters.stiffness_damping * plain
     critical = float(damped_critical_step(plain, stiffness))
     step = parameters.step_fraction * critical
-    body = make_body(MPI.COMM_SELF, pieces, tables, factor, ForceOptions(parameters.kinematics, step))
+    body = make_body(MPI.COMM_SELF, rank_elements, tables, factor, ForceOptions(parameters.kinematics, step))
     loads: list[Load] = []
     if parameters.mass_damping or stiffness:
         loads.append(RayleighDamping.build(body, parameters.mass_damping / step, stiffness))
@@ -64,7 +64,7 @@ def flight(parameters: Flight) -> dict[str, float]:
     return errors | {"step_gain": assembled / element}
 
 
-def pieces_of(parameters: Flight) -> tuple[Pieces, Tables]:
+def rank_elements_of(parameters: Flight) -> tuple[RankElements, Tables]:
     """Return the elements of a trial on this rank and their tables."""
     item = prepare(mesh_of_flight(parameters), "dns")["dns"]
     soft = laminate(parameters.poisson_ratio, parameters.orthotropy, YOUNG / parameters.contrast)
@@ -73,7 +73,7 @@ def pieces_of(parameters: Flight) -> tuple[Pieces, Tables]:
     )
     formulation = parameters.element if parameters.element == "one_point" else "incompatible_modes"
     local = distribute(MPI.COMM_SELF, item.mesh)
-    return make_pieces(local, item.tables, materials, formulation), item.tables
+    return make_rank_elements(local, item.tables, materials, formulation), item.tables
 
 
 def mesh_of_flight(parameters: Flight) -> MeshData:

@@ -22,12 +22,9 @@ def test_rows_are_computed_once(tmp_path, monkeypatch):
     asked, refused = [], ispg_tables.drop(16, 60)
     monkeypatch.setattr(results, "FOLDER", tmp_path)
     monkeypatch.setattr(ispg_tables, "TABLES", {"drops": [refused], "free": []})
-    monkeypatch.setattr(ispg_tables, "warm", lambda: asked.append("warm"))
+    monkeypatch.setattr(ispg_tables, "warm_up", lambda: asked.append("warm"))
     for arguments in ([], ["drops"], ["drops", "--again"]):
         monkeypatch.setattr("sys.argv", ["ispg_tables.py", *arguments])
         ispg_tables.main()
     assert asked == ["warm"] * 2
-    assert (
-        "16 particles along an edge"
-        in results.read_figures(ispg_tables.NAME)["drops"][refused.name]["error"]
-    )
+    assert "16 particles along an edge" in results.read_figures(ispg_tables.NAME)["drops"][refused.name]["error"]

@@ -1,4 +1,4 @@
-"""Rows of a long benchmark stay when it is broken off, and only as long as they are those of the present program."""
+"""Rows of an interrupted benchmark are kept, and discarded when the program has changed."""
 
 import pytest
 

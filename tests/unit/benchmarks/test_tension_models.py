@@ -1,13 +1,13 @@
-"""Each model of surface tension against what is exact for it, so that no bug is taken for a weakness of a model."""
+"""Each model of surface tension in an exact case, to separate bugs from weaknesses of the model."""
 
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
 from benchmarks.tension.free_pressure import FreeSurfacePressure, level_at
-from benchmarks.tension.half_level import filled, level_points
+from benchmarks.tension.half_level import fill_lattice, level_points
 from benchmarks.tension.pairwise import PAIRED, REACH, cohesion, strength
-from benchmarks.tension.scenes import start, unit_drop
+from benchmarks.tension.scenes import set_up_drop, unit_drop
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.smoothing import SUPPORT, slope
 
@@ -16,7 +16,7 @@ DROP = unit_drop(14, 0.2)
 
 def pulls(model):
     """Points, masses and accelerations by the model of a sphere of particles."""
-    simulation = start(DROP, model)
+    simulation = set_up_drop(DROP, model)
     points = np.stack(simulation.fields[:3], axis=1)
     return points, simulation.fields.mass, simulation.surface.accelerations(points, simulation.fields)
 
@@ -32,7 +32,7 @@ def test_forces_have_the_virial_of_the_tension_of_a_sphere(model, slack):
 
 def test_forces_between_pairs_have_the_tension_and_the_pressure_of_their_theory():
     """A film of particles placed with some disorder, periodic along x and y: gamma = integral of p_N - p_T."""
-    law = start(DROP, "pairwise").law
+    law = set_up_drop(DROP, "pairwise").law
     count, high, spacing = 16, 14, law.spacing
     places = np.meshgrid(np.arange(count), np.arange(count), np.arange(high), indexing="ij")
     points = spacing * np.stack(places, axis=-1).reshape(-1, 3)
@@ -52,7 +52,7 @@ def test_forces_between_pairs_have_the_tension_and_the_pressure_of_their_theory(
 
 
 def test_the_force_of_a_wall_is_that_of_a_half_space_of_particles():
-    simulation = start(unit_drop(14, 0.2, contact_angle=np.radians(60.0)), "pairwise")
+    simulation = set_up_drop(unit_drop(14, 0.2, contact_angle=np.radians(60.0)), "pairwise")
     law, fields, surface = simulation.law, simulation.fields, simulation.surface
     points = np.stack(fields[:3], axis=1)
     with_wall, surface.law = surface.accelerations(points, fields), law._replace(mirror=0)
@@ -68,9 +68,10 @@ def test_the_force_of_a_wall_is_that_of_a_half_space_of_particles():
         assert pull[near] == pytest.approx(0.75 * strength(law, 1.0) * force, rel=0.05)
 
 
+@pytest.mark.long
 def test_under_a_uniform_pressure_of_the_surface_liquid_rests():
-    """2 p G / rho is what the sums over pairs lack of a uniform pressure, wherever |G| h is above the threshold."""
-    simulation = start(DROP, "free-surface pressure")
+    """2 p G / rho completes the pair sums of a uniform pressure wherever |G| h exceeds the threshold."""
+    simulation = set_up_drop(DROP, "free-surface pressure")
     fields, surface = simulation.fields, simulation.surface
     points = np.stack(fields[:3], axis=1)
     pull = surface.accelerations(points, fields)
@@ -87,11 +88,12 @@ def test_under_a_uniform_pressure_of_the_surface_liquid_rests():
     assert not pull[:, ~at_surface].any()
 
 
+@pytest.mark.long
 def test_the_level_of_a_ball_is_a_sphere_and_bends_as_one():
     """Finely filled; the level lies inside the ball by a share of the square of the kernel over the radius."""
-    law = start(DROP, "free-surface pressure").law
-    points, volume = filled(lambda x: np.linalg.norm(x, axis=1) < 0.5, 0.5, law.spacing)
-    fields = flow.liquid_and_walls(points.T, np.empty((3, 0)), np.zeros(len(points)), law)
+    law = set_up_drop(DROP, "free-surface pressure").law
+    points, volume = fill_lattice(lambda x: np.linalg.norm(x, axis=1) < 0.5, 0.5, law.spacing)
+    fields = flow.make_fields(points.T, np.empty((3, 0)), np.zeros(len(points)), law)
     fields.mass[:] = volume
     radius = np.linalg.norm(level_points(points, volume, law.spacing, half=False), axis=1)
     assert radius.max() / radius.min() < 1.01  # its stairs are a third of a spacing high
@@ -104,6 +106,6 @@ def test_the_level_of_a_ball_is_a_sphere_and_bends_as_one():
 
 
 def test_a_surface_without_tension_does_nothing():
-    simulation = start(DROP, "free-surface pressure")
+    simulation = set_up_drop(DROP, "free-surface pressure")
     points = np.stack(simulation.fields[:3], axis=1)
     assert not FreeSurfacePressure(simulation.law, 0.0).accelerations(points, simulation.fields).any()

@@ -8,9 +8,9 @@ from reflowshock.fem.loads.pulse import STANDARD_GRAVITY, HalfSine
 from reflowshock.fem.output.acceleration import (
     Acceleration,
     acceleration,
+    apply_low_pass,
     drop_accelerations,
     is_sampled,
-    low_passed,
     watch_accelerations,
 )
 from reflowshock.fem.problem.attachment_checks import filter_problems
@@ -46,7 +46,7 @@ def j211(values: np.ndarray, step: float, channel_class: float) -> np.ndarray:
 def test_channel_frequency_classes_are_those_of_sae_j211(channel_class):
     pulse = np.exp(-(((TIME - 0.02) / 2e-4) ** 2)) * np.cos(8e3 * TIME)
     expected = j211(pulse, STEP, channel_class)
-    filtered = low_passed(pulse, STEP, LowPass(channel_class=channel_class))
+    filtered = apply_low_pass(pulse, STEP, LowPass(channel_class=channel_class))
     inner = slice(500, 3500)  # they treat the ends differently
     assert np.abs(filtered - expected)[inner].max() <= 1e-6 * np.abs(expected).max()
 
@@ -64,7 +64,7 @@ def test_frequency_response(low_pass, ratio):
     """Both passes give 1 / (1 + (s f / fc)^2n), s^2n = sqrt(2) - 1: -3 dB at the corner without phase shift."""
     order, _ = low_pass.passes
     frequency = ratio * low_pass.frequency
-    response = low_passed(np.sin(2 * np.pi * frequency * TIME), 1e-5, low_pass)[1500:2500]
+    response = apply_low_pass(np.sin(2 * np.pi * frequency * TIME), 1e-5, low_pass)[1500:2500]
     expected = (
         1.0 / (1.0 + (np.sqrt(2.0) - 1.0) * ratio ** (2 * order)) * np.sin(2 * np.pi * frequency * TIME[1500:2500])
     )
@@ -134,7 +134,7 @@ def test_package_and_board_at_rest_on_the_table_feel_the_table():
 def test_too_few_samples():
     assert is_sampled(TIME, LowPass()) and not is_sampled(TIME[::10], LowPass())
     with pytest.raises(ValueError, match="1000 samples per second are too few for a filter with CFC 1000"):
-        low_passed(np.zeros(100), 1e-3, LowPass())
+        apply_low_pass(np.zeros(100), 1e-3, LowPass())
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ from reflowshock.fem.mesh.facet import area_vectors
 from reflowshock.fem.mesh.facet_areas import outward_areas
 from reflowshock.fem.mesh.mesh import append, boundary_facets, cells_of_facets
 from reflowshock.fem.mesh.mesh_file import read_mesh, scaled_jacobians
-from reflowshock.fem.model.assembly import make_body, make_pieces
+from reflowshock.fem.model.assembly import make_body, make_rank_elements
 from reflowshock.fem.output.fields import Fields
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.materials.roles import ELASTIC
@@ -97,8 +97,8 @@ def test_dolfinx_keeps_nodes_and_writes_fields(box, tmp_path):
     local = distribute(MPI.COMM_SELF, item.mesh)
     assert np.array_equal(local.nodes[local.cells], item.mesh.cells[local.cell_numbers])
     assert np.array_equal(local.points, item.mesh.points[local.nodes])
-    pieces = make_pieces(local, item.tables, ELASTIC)
-    body = make_body(MPI.COMM_SELF, pieces, item.tables, np.ones(len(pieces.steps)))
+    rank_elements = make_rank_elements(local, item.tables, ELASTIC)
+    body = make_body(MPI.COMM_SELF, rank_elements, item.tables, np.ones(len(rank_elements.steps)))
     fields = Fields(MPI.COMM_SELF, body, item.tables.part[local.cell_numbers], tmp_path / "fields.pvd")
     fields.write(fields.sample(1e-3 * local.points, 0.0))
     fields.close()

@@ -15,7 +15,7 @@ from reflowshock.fem.errors import InvertedElementError
 from reflowshock.fem.kernels.levels import Interface
 from reflowshock.fem.loads.damping import RayleighDamping
 from reflowshock.fem.loads.load import half_sine_drop
-from reflowshock.fem.model.assembly import ForceOptions, make_body, make_pieces
+from reflowshock.fem.model.assembly import ForceOptions, make_body, make_rank_elements
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.materials.roles import Materials
 from tests.support.fem_levels import joint_on_board
@@ -37,8 +37,10 @@ def body_of(formulation: str, response: ForceOptions, pace: int = 1):
     item = prepare(mesh, "dns")["dns"]
     below = item.mesh.points[item.mesh.cells, 2].mean(axis=1) < -0.2e-3
     tables = replace(item.tables, every=np.where(below, pace, 1).astype(np.int32))
-    pieces = make_pieces(distribute(MPI.COMM_SELF, item.mesh), tables, Materials(solder=SOLDER), formulation)
-    return make_body(MPI.COMM_SELF, pieces, tables, np.ones(len(pieces.steps)), response)
+    rank_elements = make_rank_elements(
+        distribute(MPI.COMM_SELF, item.mesh), tables, Materials(solder=SOLDER), formulation
+    )
+    return make_body(MPI.COMM_SELF, rank_elements, tables, np.ones(len(rank_elements.steps)), response)
 
 
 def moving(body, loads=(), speed: float = 20.0) -> tuple[ExplicitMotion, Interface]:

@@ -7,7 +7,7 @@ import pytest
 
 from reflowshock.cases.hard.trials.coupled import MANY, surveyed
 from reflowshock.fem.division.checks import check_division
-from reflowshock.fem.division.divide import divide, grown, scheme_for
+from reflowshock.fem.division.divide import divide, grow_region, scheme_for
 from reflowshock.fem.division.split import interface_between, part_of
 from reflowshock.fem.division.tables import model_inputs
 from reflowshock.fem.errors import CouplingError
@@ -66,8 +66,8 @@ def test_more_buffer_layers_are_more_cells(mesh):
 def test_layers_grow_by_nodes():
     cells = np.array([[0, 1], [1, 2], [2, 3], [3, 4]], np.int32)
     seeds = np.array([True, False, False, False, False])
-    assert grown(cells, seeds, np.ones(4, bool), 2).tolist() == [True, True, False, False]
-    assert grown(cells, seeds, np.array([True, False, True, True]), 4).tolist() == [True, False, False, False]
+    assert grow_region(cells, seeds, np.ones(4, bool), 2).tolist() == [True, True, False, False]
+    assert grow_region(cells, seeds, np.array([True, False, True, True]), 4).tolist() == [True, False, False, False]
 
 
 def test_large_mass_leaves_levels_along_a_path_where_the_meso_model_has_none_of_its_nodes(mesh):

@@ -6,7 +6,7 @@ import pytest
 
 from reflowshock.cases.hard.trials.grids import joint_mesh
 from reflowshock.fem.division.fine_joints import read_coarse, with_coarse_joints
-from reflowshock.fem.division.tables import joined
+from reflowshock.fem.division.tables import join_meshes
 from reflowshock.fem.errors import MeshError
 from reflowshock.fem.mesh.mesh import append
 from reflowshock.fem.mesh.watch_table import joint_names, whole_watch
@@ -48,7 +48,7 @@ def test_all_joints_but_the_fine_ones_are_coarse(mesh):
 def test_joints_keep_their_order_so_that_histories_compare(mesh):
     mixed = with_coarse_joints(mesh, coarse_joints(), ["B3"])
     assert joint_names(mixed) == joint_names(mesh)
-    assert whole_watch(joined(mixed).mesh, 25e-6).joints == whole_watch(joined(mesh).mesh, 25e-6).joints
+    assert whole_watch(join_meshes(mixed).mesh, 25e-6).joints == whole_watch(join_meshes(mesh).mesh, 25e-6).joints
 
 
 def test_all_fine_is_the_mesh_itself(mesh):

@@ -14,7 +14,7 @@ from reflowshock.fem.model.assembly import ForceOptions
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.stress_recovery import StressRecovery
 from reflowshock.fem.parallel import checkpoint_state
-from reflowshock.fem.run.cooling import pins, rigid_motions
+from reflowshock.fem.run.cooling import choose_pins, rigid_motions
 from reflowshock.materials.library import FR4, SAC405, SILICON
 from tests.support.fem_residual import Cooled, cooled, layered
 
@@ -113,7 +113,7 @@ def test_pins_hold_what_is_left():
     for planes in range(4):
         if planes:
             held[np.arange(4 * planes, 4 * planes + 5), planes - 1] = True
-        nodes, components = pins(points, held, usable)
+        nodes, components = choose_pins(points, held, usable)
         assert usable[nodes].all()
         assert not held[nodes, components].any()
         everything = held.copy()

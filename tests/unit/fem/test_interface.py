@@ -8,7 +8,7 @@ import pytest
 from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.grids import COPPER, GAP
-from reflowshock.fem.estimates.estimate import WindowPlan, shortened
+from reflowshock.fem.estimates.estimate import WindowPlan, shorten_plan
 from reflowshock.fem.output.compare import compare_histories
 from reflowshock.fem.output.joint_interface import picture_windows
 from reflowshock.fem.problem.inputs import RunInput
@@ -131,7 +131,7 @@ def test_windows_of_pictures_are_the_nearest():
 
 def test_shortened_plans_end_at_samples():
     plan = WindowPlan(window=1e-7, substeps=3, windows=100, stride=10)
-    assert [shortened(plan, time).windows for time in (1e-9, 1e-6, 1.01e-6, 1e-5, 1.0)] == [10, 10, 20, 100, 100]
+    assert [shorten_plan(plan, time).windows for time in (1e-9, 1e-6, 1.01e-6, 1e-5, 1.0)] == [10, 10, 20, 100, 100]
 
 
 def test_times_after_the_end_are_refused():

@@ -9,7 +9,7 @@ import pytest
 from mpi4py import MPI
 
 from reflowshock.fem.division.chebyshev import Substeps
-from reflowshock.fem.division.choose_levels import Pace, choose_levels, governing_steps
+from reflowshock.fem.division.choose_levels import StepLimits, choose_levels, governing_steps
 from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.elements.one_point import ONE_POINT
 from reflowshock.fem.errors import LevelError
@@ -157,7 +157,7 @@ CHAIN = np.column_stack([np.arange(12), np.arange(1, 13)]).astype(np.int32)
 
 def test_levels_grow_by_the_elements_of_their_nodes():
     steps = np.array([1, 1, 1, 1, 0.2, 1, 1, 1, 1, 1, 1, 1.0])
-    level, ratios = choose_levels(CHAIN, Tie.none(), Pace(steps, np.full(12, 1e6), 0.9, 0.9), 1)
+    level, ratios = choose_levels(CHAIN, Tie.none(), StepLimits(steps, np.full(12, 1e6), 0.9, 0.9), 1)
     assert level.tolist() == [0, 0, 0, 1, 1, 1, 0, 0, 0, 0, 0, 0]
     assert ratios == (6,)  # 5, and one for the reach of stabilised substeps
 
@@ -176,7 +176,7 @@ def test_masters_of_a_slave_share_its_level():
 def test_more_levels_are_taken_where_they_pay():
     steps = np.concatenate([np.full(2, 0.05), np.full(20, 0.4), np.ones(40)])
     cells = np.column_stack([np.arange(62), np.arange(1, 63)]).astype(np.int32)
-    dear, cheap = (Pace(steps, np.full(62, cost), 1.0, 1.0) for cost in (1e6, 1.0))
+    dear, cheap = (StepLimits(steps, np.full(62, cost), 1.0, 1.0) for cost in (1e6, 1.0))
     assert choose_levels(cells, Tie.none(), dear, 1)[1] == (21,)
     level, ratios = choose_levels(cells, Tie.none(), dear, 3)
     assert ratios == (3, 8)
@@ -185,28 +185,28 @@ def test_more_levels_are_taken_where_they_pay():
 
 
 def test_no_level_where_all_elements_take_the_window():
-    level, ratios = choose_levels(CHAIN, Tie.none(), Pace(np.ones(12), np.ones(12), 0.9, 0.9), 3)
+    level, ratios = choose_levels(CHAIN, Tie.none(), StepLimits(np.ones(12), np.ones(12), 0.9, 0.9), 3)
     assert not level.any()
     assert ratios == ()
 
 
 def test_too_many_steps_are_refused():
     with pytest.raises(LevelError, match="allowed: 64 steps per level and 1 levels"):
-        choose_levels(CHAIN, Tie.none(), Pace(np.geomspace(1e-3, 1.0, 12), np.ones(12), 0.9, 0.9), 1)
+        choose_levels(CHAIN, Tie.none(), StepLimits(np.geomspace(1e-3, 1.0, 12), np.ones(12), 0.9, 0.9), 1)
 
 
 def test_damping_takes_more_substeps_and_has_a_limit():
     assert Substeps.of(8, 1, 0.02).reach < Substeps.of(8, 1).reach
-    damped = Pace(np.ones(12), np.ones(12), 0.9, 0.9, stiffness=0.01)
+    damped = StepLimits(np.ones(12), np.ones(12), 0.9, 0.9, stiffness=0.01)
     assert choose_levels(CHAIN, Tie.none(), damped, 1)[0].min() == 1  # the window is too large for damped elements
     with pytest.raises(LevelError, match=r"too large for local time steps; the limit is 0\.03"):
         Substeps.of(8, 1, 0.04)
 
 
 def test_very_different_steps_are_divided_in_seconds():
-    pace = Pace(np.geomspace(1e-4, 1.0, 12), np.full(12, 1e6), 0.9, 0.9)
+    step_limits = StepLimits(np.geomspace(1e-4, 1.0, 12), np.full(12, 1e6), 0.9, 0.9)
     start = time.monotonic()
-    level, ratios = choose_levels(CHAIN, Tie.none(), pace, 4)
+    level, ratios = choose_levels(CHAIN, Tie.none(), step_limits, 4)
     assert time.monotonic() - start < 5.0
     assert level.max() == len(ratios) >= 2
     assert 0.9 / math.prod(ratios) < 0.9e-4 * 1.01

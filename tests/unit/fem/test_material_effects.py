@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from reflowshock.effect import decided
+from reflowshock.effect import decide_all
 from reflowshock.fem.estimates.drop_effects import Failing
 from reflowshock.fem.estimates.material_effects import MATERIAL_EFFECTS
 from reflowshock.fem.problem.failure import Failure, Life
@@ -27,10 +27,10 @@ def test_life_follows_the_law_within_its_scatter():
 
 
 def test_effects_name_the_materials_that_call_for_them():
-    off = decided(MATERIAL_EFFECTS, SimpleNamespace(materials=ELASTIC.by_role))
+    off = decide_all(MATERIAL_EFFECTS, SimpleNamespace(materials=ELASTIC.by_role))
     assert not any(effect["on"] for effect in off.values())
     hot = SNPB.model_copy(update={"temperature": 398.15})
-    on = decided(MATERIAL_EFFECTS, SimpleNamespace(materials={"solder": hot, "bump": SAC305, "die": SILICON}))
+    on = decide_all(MATERIAL_EFFECTS, SimpleNamespace(materials={"solder": hot, "bump": SAC305, "die": SILICON}))
     assert all(effect["on"] for effect in on.values())
     assert on["plasticity"]["why"].startswith("solder yields from 18 MPa on, hardening 55 MPa p^0.55; bump yields")
     assert on["thermal_softening"]["why"] == f"solder: yield stress times {1 - (100 / 158) ** 1.4:.3g}"

@@ -231,7 +231,7 @@ def test_bad_input_is_said_before_anything_is_computed(tmp_path, capsys, changes
 
 def test_mesh_that_does_not_fit_the_layers(tmp_path):
     request = structure_input(tmp_path, strip_mesh(layers=("board", "cover")))
-    with pytest.raises(AgreedError, match="parts that are no layer: cover"):
+    with pytest.raises(AgreedError, match="parts without a layer: cover"):
         run_structure(MPI.COMM_SELF, request)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from reflowshock.fem.division.division import Division
-from reflowshock.fem.division.structure_tables import structure_tables, tied
+from reflowshock.fem.division.structure_tables import structure_tables, tie_layers
 from reflowshock.fem.division.tables import split
 from reflowshock.fem.errors import CouplingError, StepError
 from reflowshock.fem.estimates.estimate import WindowPlan
@@ -12,7 +12,7 @@ from reflowshock.fem.mesh.mesh_file import read_mesh
 from reflowshock.fem.output.compare import relative_error
 from reflowshock.fem.output.compare_structures import solver_differences
 from reflowshock.fem.problem.structure_checks import problems
-from reflowshock.fem.setup.structure_models import divided_on_one_rank
+from reflowshock.fem.setup.structure_models import divide_on_one_rank
 from tests.support.fem_bars import bar_layers, run_bar, write_bar
 
 WIDTH = 2e-3
@@ -41,7 +41,7 @@ def dynamics(**changes) -> dict:
 
 def test_fine_layers_are_those_of_small_steps_and_all_is_counted_once(tmp_path):
     request = write_bar(tmp_path, WIDTH, LAYERS, 1e-5, **TABLES, dynamics=dynamics())
-    whole = tied(read_mesh(request.mesh), request)
+    whole = tie_layers(read_mesh(request.mesh), request)
     tables = structure_tables(whole, request)
     meso = (whole.mesh.points[whole.mesh.cells].mean(axis=1)[:, 2] > 3e-3) & whole.mesh.in_parts("layer_2".__ne__)
     plan = WindowPlan(1e-7, 2, 200, 1)
@@ -60,7 +60,7 @@ def test_fine_layers_are_those_of_small_steps_and_all_is_counted_once(tmp_path):
 
 def test_the_finest_layer_and_its_buffer_are_the_meso_model(tmp_path):
     request = write_bar(tmp_path, WIDTH, LAYERS, 1e-5, **TABLES, dynamics=dynamics())
-    division = divided_on_one_rank(request)
+    division = divide_on_one_rank(request)
     elements = {role: len(tables.part) for role, tables in division.tables.items()}
     assert elements == {"macro": 2 * 4 * 4, "meso": 36 + 2 * 2 * 4}
     assert division.coupling["cut_nodes"] == 2 * 9
@@ -71,13 +71,13 @@ def test_layers_that_are_alike_have_none_that_is_fine(tmp_path):
     layers = LAYERS | {"layer_1": LAYERS["layer_1"] | {"cells": 1, "in_plane": (2, 2)}}
     request = write_bar(tmp_path, WIDTH, layers, 1e-5, **TABLES, dynamics=dynamics())
     with pytest.raises(CouplingError, match=r"half of the longest.*name the fine layers in dynamics\.coupling\.fine"):
-        divided_on_one_rank(request)
+        divide_on_one_rank(request)
 
 
 def test_a_pulse_shorter_than_a_window_is_refused_with_both_durations(tmp_path):
     request = write_bar(tmp_path, WIDTH, LAYERS, 1e-8, dynamics=dynamics())
     with pytest.raises(StepError, match=r"loads\.push lasts 1e-08 s, less than the coupling window of 1\.\d+e-07 s"):
-        divided_on_one_rank(request)
+        divide_on_one_rank(request)
 
 
 @pytest.mark.parametrize("scheme", ["held_velocity", "gravouil_combescure", "local_steps"])
@@ -149,7 +149,7 @@ def test_impulses_refuse_a_prescribed_motion_of_the_cut(tmp_path):
     side = {"loads": {"side": LOADS["pull"] | {"on": "x_max", "component": "x"}}, "supports": {}}
     changes = dynamics(coupling={"scheme": "impulse", "fine": ["layer_1"]})
     with pytest.raises(CouplingError, match=r"loads\.side prescribes the motion of 6 interface nodes.*impulse"):
-        divided_on_one_rank(write_bar(tmp_path, WIDTH, LAYERS, 1e-5, **(TABLES | side), dynamics=changes))
+        divide_on_one_rank(write_bar(tmp_path, WIDTH, LAYERS, 1e-5, **(TABLES | side), dynamics=changes))
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from reflowshock.cases.hard.trials.grids import GAP
 from reflowshock.cases.hard.trials.packages import MM, board, package
-from reflowshock.effect import decided
+from reflowshock.effect import decide_all
 from reflowshock.fem.estimates.thermal_effects import (
     HEATED_EFFECTS,
     NEGLIGIBLE,
@@ -84,7 +84,7 @@ def test_switches_are_followed_and_rigid_plates_take_no_force():
     roles = ELASTIC.by_role
 
     def decide(thermal: Thermal, surface_tension: float) -> dict:
-        return decided(HEATED_EFFECTS, Heated(thermal, roles, SIZES, surface_tension, [thermal.peak]))
+        return decide_all(HEATED_EFFECTS, Heated(thermal, roles, SIZES, surface_tension, [thermal.peak]))
 
     auto = decide(Thermal(), 0.5)
     assert {name: effect["on"] for name, effect in auto.items()} == {

@@ -80,6 +80,7 @@ def test_holes_are_round(quarter):
     assert np.ptp(walls[:, :, 2]) == pytest.approx(1.0 * MM)
 
 
+@pytest.mark.long
 def test_full_model_is_four_quarters(tmp_path, quarter):
     full = Assembly(tmp_path, package(), board(symmetry="full"))
     assert full.counts == {name: 4 * count for name, count in quarter.counts.items()}

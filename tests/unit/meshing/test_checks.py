@@ -105,7 +105,7 @@ def test_a_board_that_is_said_to_be_long_enough_is():
     assert not found(package(), board(length=1.001 * float(allowed.split()[1]) * MM, holes=inset))
 
 
-def test_an_inset_between_the_limits_that_are_told_fits():
+def test_an_inset_between_the_reported_limits_fits():
     holes = {"diameter": 2 * MM, "inset_x": 3 * MM, "inset_y": 13 * MM}
     allowed = found(package(), board(holes=holes))["board.holes.inset_y"].allowed
     least, most = (float(text.split()[0]) for text in allowed.split(" to "))

@@ -40,14 +40,14 @@ def files(meshes, tmp_path_factory) -> tuple[MeshData, MeshData]:
     return read_mesh(folder / "fine.msh"), read_mesh(folder / "coarse.msh")
 
 
-def test_it_says_why_and_others_are_coarse(meshes):
+def test_the_reason_is_recorded_and_other_joints_are_coarse(meshes):
     ball, barrel_ = (joint_quality(mesh) for mesh in meshes.coarse)
     assert "use more layers" in ball["fine_instead"] and "fine_instead" not in barrel_
     assert np.array_equal(meshes.coarse[0].points, meshes.fine[0].points)
     assert set(meshes.coarse[1].cells) == {"solder@B4"}
 
 
-def test_the_report_tells_it(meshes, tmp_path):
+def test_the_report_lists_fine_joints_with_reasons(meshes, tmp_path):
     assert mesh_tables.fine_instead(tmp_path) is None
     (tmp_path / "solder_mesh").mkdir()
     quality = {mesh.name: joint_quality(mesh) for mesh in meshes.coarse}
@@ -63,7 +63,7 @@ def test_such_a_joint_takes_its_place_among_coarse_ones(files):
     assert counts[0] == counts[1]
 
 
-def test_its_copy_beside_the_fine_one_is_told_apart_with_its_copper(files):
+def test_coarse_and_fine_copies_of_a_joint_have_their_own_parts(files):
     fine, coarse = files
     both = append([fine, copies(coarse, ["A4"])])
     original, copy = copied_joints(both)

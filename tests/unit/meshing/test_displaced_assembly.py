@@ -75,8 +75,8 @@ def test_only_what_the_package_does_beyond_the_board_counts(flat):
 
 
 @pytest.mark.parametrize("symmetry", ["quarter", pytest.param("full", marks=pytest.mark.long)])
-def test_the_underside_is_that_of_the_facets(tmp_path, symmetry):
-    """Heights at points of displaced facets, found by their shape functions, are those of the object."""
+def test_the_underside_equals_the_facets(tmp_path, symmetry):
+    """``PackageSide`` gives the heights of displaced facets, which their shape functions give independently."""
     write_assembly(package(), board(symmetry=symmetry), tmp_path / "flat.msh")
     side = write_displaced_assembly(tmp_path / "flat.msh", bend, tmp_path / "bent.msh")
     mesh = MeshFile(tmp_path / "bent.msh")
@@ -87,7 +87,7 @@ def test_the_underside_is_that_of_the_facets(tmp_path, symmetry):
     assert side.height(*points.T[:2]) == pytest.approx(points[:, 2], abs=1e-15)
 
 
-def test_prescribed_side_is_that_of_the_displaced_mesh(flat):
+def test_the_prescribed_underside_equals_the_displaced_mesh(flat):
     warpage = Warpage(corner=0.05 * MM)
     meshed = write_displaced_assembly(
         flat / "flat.msh", prescribed_displacement(package(), warpage), flat / "warped.msh"
@@ -108,7 +108,7 @@ def test_a_package_in_the_board_is_refused(flat):
         write_displaced_assembly(flat / "flat.msh", sunk, flat / "sunk.msh")
 
 
-def test_what_is_no_grid_is_refused():
+def test_points_that_form_no_grid_are_rejected():
     with pytest.raises(NotStructuredError, match="3 nodes do not form a grid of 2 x 2 lines"):
         StructuredFace.of_nodes(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]), np.zeros((3, 1)))
     side = PackageSide.prescribed(package(), board(), Warpage())

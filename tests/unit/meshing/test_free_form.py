@@ -49,7 +49,7 @@ def test_a_void_is_left_free(hollow):
     assert quality["minimum_scaled_jacobian"] > 0.2
 
 
-def test_the_way_that_failed_is_told(hollow):
+def test_the_failed_attempt_is_recorded(hollow):
     first, *others = joint_quality(hollow[0])["tries"]
     assert first["method"] == "free-form" and first["missed"].startswith("Gmsh: ")
     assert all(way["missed"] for way in others)  # how many there are depends on the system's numerical libraries
@@ -70,7 +70,7 @@ def test_a_bridge_has_the_pads_of_both_joints(bridge, sites):
 
 
 def test_all_hexahedra_fit_together(bridge):
-    """Facets beyond the solder's are those of the copper: nothing inside is open."""
+    """Boundary facets belong to solder or copper: no crack is open inside."""
     mesh, _ = bridge
     cells = np.vstack(list(mesh.cells.values()))
     quads = boundary_quads(cells)

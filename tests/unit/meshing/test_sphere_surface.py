@@ -10,7 +10,7 @@ from reflowshock.meshing.surface.truncated_sphere import TruncatedSphere
 
 
 @pytest.mark.parametrize(("board", "package", "volume"), [(0.24, 0.24, 0.0724), (0.3, 0.2, 0.09), (0.24, 0.24, 0.03)])
-def test_surface_is_that_of_the_sphere(board, package, volume):
+def test_surface_equals_the_sphere(board, package, volume):
     sphere = TruncatedSphere.of_volume(volume * MM**3, board * MM, package * MM)
     surface = sphere_surface(sphere)
     measured = measure(surface)

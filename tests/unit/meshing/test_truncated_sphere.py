@@ -24,7 +24,7 @@ def test_equal_discs_are_symmetric():
 
 
 @pytest.mark.parametrize("discs", DISCS)
-def test_distance_is_that_of_the_nearest_point(discs):
+def test_distance_equals_the_distance_to_the_nearest_point(discs):
     zone = TruncatedSphere.of_volume(7.24e-11, *discs)
     heights = np.linspace(0.0, zone.height, 20001)
     radii = np.sqrt(zone.radius**2 - (heights - zone.centre) ** 2)

@@ -1,4 +1,4 @@
-"""Surfaces from elsewhere: taken when they enclose a joint, else refused by name, place and what is allowed."""
+"""Surfaces from user files: accepted if they enclose a joint, else rejected with fault, position and allowed range."""
 
 import meshio
 import numpy as np
@@ -127,16 +127,16 @@ def test_another_unit_is_refused_and_the_right_one_named(tmp_path):
         load_surface(path, "mm", SITE)
 
 
-def test_files_that_are_no_surface_are_refused(tmp_path):
+def test_files_without_a_surface_are_rejected(tmp_path):
     for name, message in (("joint.obj", "suffix .obj, allowed .stl, .ply, .vtu"), ("none.stl", "no such file")):
         with pytest.raises(SurfaceError, match=message):
             load_surface(tmp_path / name, "mm", SITE)
-    (tmp_path / "text.ply").write_text("this is no surface\n")
+    (tmp_path / "text.ply").write_text("not a surface\n")
     with pytest.raises(SurfaceError, match="cannot be read"):
         load_surface(tmp_path / "text.ply", "mm", SITE)
     box = meshio.Mesh(np.eye(4, 3), [("quad", np.array([[0, 1, 2, 3]]))])
     meshio.write(tmp_path / "quads.vtu", box)
-    with pytest.raises(SurfaceError, match="holds quad, allowed triangles"):
+    with pytest.raises(SurfaceError, match="contains quad, allowed triangles"):
         load_surface(tmp_path / "quads.vtu", "mm", SITE)
 
 

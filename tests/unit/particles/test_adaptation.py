@@ -43,18 +43,18 @@ def moving(stretch=1.0, keep=None):
     return flow, Adaptation(flow.solver, LIQUID)
 
 
-def ledger(flow):
+def energy_losses(flow):
     return LIQUID.energy(flow.body) + flow.solver.state.losses.total
 
 
 def check_kept(flow, event):
     """Check volume, centre and energy budget after the event, and momenta after the next step."""
-    before, losses, momenta = body_moments(flow.body), ledger(flow), flow.solver.state.momenta
+    before, losses, momenta = body_moments(flow.body), energy_losses(flow), flow.solver.state.momenta
     event.update(flow.body)
     after = body_moments(flow.body)
     assert after[0] == pytest.approx(before[0], rel=1e-13)
     assert after[1] == pytest.approx(before[1], abs=1e-13)
-    assert ledger(flow) == pytest.approx(losses, rel=1e-13)
+    assert energy_losses(flow) == pytest.approx(losses, rel=1e-13)
     body, state = flow.body, flow.solver.state
     assert len(body.points) == len(body.velocity) == len(body.cloud.wall) == len(state.points) == len(state.gradient)
     assert boundary_loops(body.triangles) == ()

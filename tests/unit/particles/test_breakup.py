@@ -5,10 +5,10 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from reflowshock.particles.flows.droplet import Droplet, DropletNumerics
-from reflowshock.particles.sph.surface_coupling import find_weights, near_vertices
+from reflowshock.particles.sph.surface_coupling import find_near_vertices, find_weights
 from reflowshock.particles.sph_flows.droplet import droplet
 from reflowshock.particles.surface import remeshing
-from reflowshock.particles.surface.breakup import are_outside, largest_part, small_parts, split_fans
+from reflowshock.particles.surface.breakup import are_outside, find_largest_part, find_small_parts, split_fans
 from reflowshock.particles.surface.cloud_level_set import CannotRebuild, area_within, boundary_loops
 from reflowshock.particles.surface.morphological_closing import count_parts
 from reflowshock.particles.surface.remeshing import FEWEST, GAPS
@@ -65,16 +65,16 @@ def test_dry_spots_that_meet_in_a_point_become_one():
 def test_parts_that_are_too_small_are_found_and_the_largest_never_is_one():
     points = np.concatenate((CORNERS, 0.5 * CORNERS + 3.0))
     triangles = np.concatenate((TETRAHEDRON, TETRAHEDRON + 4))
-    is_small, volume = small_parts(points, triangles, 1.0)
+    is_small, volume = find_small_parts(points, triangles, 1.0)
     assert np.array_equal(is_small, np.arange(8) >= 4) and volume == pytest.approx(1.0 / 48.0)
-    assert not small_parts(points, triangles, 1e-3)[0].any()
-    assert np.array_equal(largest_part(points, triangles), CORNERS)
+    assert not find_small_parts(points, triangles, 1e-3)[0].any()
+    assert np.array_equal(find_largest_part(points, triangles), CORNERS)
 
 
 def test_a_cavity_is_no_part_that_is_too_small():
     points = np.concatenate((CORNERS, 0.5 * CORNERS + 0.1))
     triangles = np.concatenate((TETRAHEDRON, TETRAHEDRON[:, ::-1] + 4))
-    is_small, volume = small_parts(points, triangles, 1.0)
+    is_small, volume = find_small_parts(points, triangles, 1.0)
     assert not is_small.any() and volume == 0.0
 
 
@@ -100,7 +100,7 @@ def test_liquid_that_has_left_more_than_a_tenth_of_its_surface_ends_the_run():
 def test_a_reason_to_make_the_surface_anew_that_failed_holds_up_no_other(monkeypatch):
     simulation, tried = droplet(Droplet(**INK, numerics=COARSE)), []
     surface = simulation.surface
-    monkeypatch.setattr(remeshing, "rebuilt_from_distance", lambda *arguments: tried.append(arguments[-1]))
+    monkeypatch.setattr(remeshing, "rebuild_from_distance", lambda *arguments: tried.append(arguments[-1]))
     monkeypatch.setattr(remeshing, "is_worn", lambda *arguments: True)
     has_gap = False
     monkeypatch.setattr(remeshing, "has_narrow_gap", lambda mesh: has_gap)
@@ -165,7 +165,7 @@ def test_a_vertex_without_particles_follows_the_nearest_one():
     simulation = droplet(Droplet(**INK, numerics=COARSE))
     particles = np.ascontiguousarray(np.array(simulation.fields[:3]).T)
     vertices = np.array([[0.0, 0.0, 0.5], [0.0, 0.0, 3.0], [3.0, 0.0, 0.0]])
-    lists = near_vertices(vertices, particles, 0.3)
+    lists = find_near_vertices(vertices, particles, 0.3)
     weights = np.empty((2, 2, len(lists[1])))
     levels = find_weights(vertices, lists, simulation.fields, simulation.law, weights)
     assert levels[0] > 0.0 and not levels[1:].any()

@@ -30,7 +30,7 @@ def column(count, mirror=1, **changes):
     law = law._replace(dimension=1, spacing=1e-6, length=1.3e-6, norm=norm(law.kernel, 1, 1.3e-6), mirror=mirror)
     points = np.zeros((3, count))
     points[2] = 1e-6 * (np.arange(count) + 0.5)
-    fields = flow.liquid_and_walls(points, np.empty((3, 0)), np.zeros(count), law)
+    fields = flow.make_fields(points, np.empty((3, 0)), np.zeros(count), law)
     freezing = Freezing(**(SOLDER | changes))
     return Heat(freezing, law, np.full(count, enthalpy_at(freezing, freezing.temperature))), fields
 

@@ -3,8 +3,8 @@ import pytest
 
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.core.plate import Plate
-from reflowshock.particles.gripc.moving_least_squares import derivatives
-from reflowshock.particles.ispg.ghosts import mirror
+from reflowshock.particles.gripc.moving_least_squares import fit_derivatives
+from reflowshock.particles.ispg.ghosts import mirror_particles
 
 REACH = 0.3
 
@@ -23,7 +23,7 @@ def points():
 def test_images_equal_a_loop_over_particles(points):
     """The twin applies the reflection formula to one particle at a time."""
     plate = tilted()
-    images = mirror(points, (plate,), REACH)
+    images = mirror_particles(points, (plate,), REACH)
     expected, source = [], []
     for number, point in enumerate(points):
         height = float((point - plate.origin) @ plate.normal)
@@ -35,13 +35,13 @@ def test_images_equal_a_loop_over_particles(points):
 
 
 def test_particles_on_the_wall_are_their_own_image(points):
-    images = mirror(points, (Plate.horizontal(0.0),), REACH)
+    images = mirror_particles(points, (Plate.horizontal(0.0),), REACH)
     assert not set(images.source) & set(range(20))
 
 
 def test_an_edge_between_two_walls_has_images_of_both():
     side = Plate(np.zeros(3), np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]))
-    images = mirror(np.array([[0.1, 0.5, 0.1]]), (Plate.horizontal(0.0), side), REACH)
+    images = mirror_particles(np.array([[0.1, 0.5, 0.1]]), (Plate.horizontal(0.0), side), REACH)
     expected = [[-0.1, 0.5, -0.1], [-0.1, 0.5, 0.1], [0.1, 0.5, -0.1]]
     assert np.array(sorted(images.points.tolist())) == pytest.approx(np.array(expected))
     velocity = images.vector(1) @ np.array([1.0, 2.0, 3.0])
@@ -54,7 +54,7 @@ def test_images_of_liquid_that_a_plate_takes_along_move_with_both(slip):
     points = np.random.default_rng(4).uniform(0.05, 0.25, (30, 3))
     plates = (tilted(), Plate.horizontal(0.4, side=1.0))
     twist = np.array([0.3, -0.2, 0.5, 0.7, 1.1, -0.4])
-    mirrored = mirror(points, plates, 2.0 * REACH, [slip, slip])
+    mirrored = mirror_particles(points, plates, 2.0 * REACH, [slip, slip])
     other = np.concatenate((twist[:3] + np.cross(twist[3:], plates[1].origin - plates[0].origin), twist[3:]))
     moving = plates[0].rigid_velocity(twist, points)
     images = np.einsum("gcd,gd->gc", mirrored.reflection, moving[mirrored.source])
@@ -66,7 +66,7 @@ def test_images_of_liquid_that_a_plate_takes_along_move_with_both(slip):
 def test_a_plate_that_slides_takes_nothing_along_without_friction():
     points = np.random.default_rng(4).uniform(0.05, 0.25, (30, 3))
     plates = (Plate.horizontal(0.0),)
-    drift = mirror(points, plates, REACH).drift(points, plates, {0: np.array([1.0, 2.0, 0.0, 0.0, 0.0, 3.0])})
+    drift = mirror_particles(points, plates, REACH).drift(points, plates, {0: np.array([1.0, 2.0, 0.0, 0.0, 0.0, 3.0])})
     assert drift == pytest.approx(0.0, abs=1e-12)
 
 
@@ -75,12 +75,12 @@ def gradients(basis):
     axis = np.linspace(0.0, 1.0, 7)
     cloud = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
     cloud += np.random.default_rng(8).uniform(-0.02, 0.02, cloud.shape) * (cloud[:, 2:] > 0.0)
-    ghosts = mirror(cloud, (Plate.horizontal(0.0),), 0.4)
+    ghosts = mirror_particles(cloud, (Plate.horizontal(0.0),), 0.4)
     everything = np.concatenate((cloud, ghosts.points))
     rows = np.flatnonzero((cloud[:, 2] == 0.0) & (np.abs(cloud[:, :2] - 0.5) < 0.3).all(axis=1)).astype(np.int32)
     neighbours = NeighbourList(0.4, 0.0)
     neighbours.update(everything)
-    fitted = derivatives(everything, rows, neighbours, basis)
+    fitted = fit_derivatives(everything, rows, neighbours, basis)
     scalar = ghosts.even(len(cloud)) @ (2.0 * cloud[:, 0] - cloud[:, 1] + 3.0)
     vector = ghosts.vector(len(cloud)) @ np.column_stack((cloud[:, 0], -3.0 * cloud[:, 1], 2.0 * cloud[:, 2])).T.ravel()
     components = [scalar, *vector.reshape(3, -1)]
@@ -98,12 +98,12 @@ def test_a_quadratic_even_field_is_exact_at_the_wall():
     """For the even field u = x^2 - z^2 the Laplacian and the normal gradient vanish on the wall."""
     axis = np.linspace(-0.5, 0.5, 7)
     cloud = np.stack(np.meshgrid(axis, axis, axis + 0.5, indexing="ij"), axis=-1).reshape(-1, 3)
-    ghosts = mirror(cloud, (Plate.horizontal(0.0),), 0.4)
+    ghosts = mirror_particles(cloud, (Plate.horizontal(0.0),), 0.4)
     everything = np.concatenate((cloud, ghosts.points))
     neighbours = NeighbourList(0.4, 0.0)
     neighbours.update(everything)
     row = np.array([np.argmin((cloud**2).sum(axis=1))], np.int32)
-    fitted = derivatives(everything, row, neighbours, "quadratic")
+    fitted = fit_derivatives(everything, row, neighbours, "quadratic")
     field = ghosts.even(len(cloud)) @ (cloud[:, 0] ** 2 - cloud[:, 2] ** 2)
     assert fitted.laplacian @ field == pytest.approx(0.0, abs=1e-9)
     assert fitted.gradient[2] @ field == pytest.approx(0.0, abs=1e-9)

@@ -11,7 +11,14 @@ from reflowshock.particles.core.plate import Plate
 from reflowshock.particles.discretisation.incompressibility import SolveFailed
 from reflowshock.particles.gripc.collocation import collocate
 from reflowshock.particles.gripc.gripc_step import GripcStep, force_pressure, viscous_pressure
-from reflowshock.particles.gripc.projection import Material, Poisson, Velocities, correct_pressure, smooth, solve_gmres
+from reflowshock.particles.gripc.projection import (
+    Material,
+    Poisson,
+    Velocities,
+    correct_pressure,
+    smooth_velocities,
+    solve_gmres,
+)
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Mass
@@ -36,7 +43,7 @@ def test_smoothing_equals_the_printed_sum():
     """The twin evaluates eq 28 for one particle at a time."""
     random = np.random.default_rng(2)
     shape, old, new, retained = random.normal(size=(4, 4)), *random.normal(size=(3, 4))
-    result = smooth(Velocities(old, retained), new, sparse.csr_matrix(shape))
+    result = smooth_velocities(Velocities(old, retained), new, sparse.csr_matrix(shape))
     for j in range(4):
         change = sum(shape[j, i] * (new[i] - old[i]) for i in range(4))
         end = sum(shape[j, i] * new[i] for i in range(4))
@@ -48,7 +55,7 @@ def test_smoothing_equals_the_printed_sum():
 def test_a_uniform_slip_is_not_smoothed_away(box, basis):
     uniform = np.repeat([2.0, -1.0, 0.0], len(box.points))
     smoothing = collocate(box.points, box.plates, box.spacing, basis).smoothing
-    assert smooth(Velocities(uniform, uniform), uniform, smoothing).unsmoothed == pytest.approx(uniform)
+    assert smooth_velocities(Velocities(uniform, uniform), uniform, smoothing).unsmoothed == pytest.approx(uniform)
 
 
 def test_the_corrected_pressure_is_given_on_the_surface(box, operators):

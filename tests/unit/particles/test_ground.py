@@ -29,7 +29,7 @@ def test_distances_and_normals_are_those_of_the_level_set():
 
 def test_images_are_as_deep_as_points_are_high_and_turned():
     solid, points = ball(), np.array([[1.2, 0.0, 0.0], [0.0, 0.0, 1.9]])
-    images, turned = ground.reflect(solid, points, np.array([[1.0, 2.0, 0.0], [1.0, 1.0, 1.0]]), reach=0.5)
+    images, turned = ground.reflect_at_ground(solid, points, np.array([[1.0, 2.0, 0.0], [1.0, 1.0, 1.0]]), reach=0.5)
     assert images[0] == pytest.approx((0.8, 0.0, 0.0), abs=5e-3)
     assert turned[0] == pytest.approx((-1.0, 2.0, 0.0), abs=1e-9)
     assert np.array_equal(images[1], points[1]) and not turned[1].any()
@@ -38,8 +38,8 @@ def test_images_are_as_deep_as_points_are_high_and_turned():
 def test_what_is_near_and_faces_the_ground_settles_on_it():
     points = np.array([[1.05, 0.0, 0.0], [1.05, 0.0, 0.0], [0.0, 0.95, 0.0], [0.0, 0.0, 1.5]])
     outward = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]])
-    share, normals = ground.settle(ball(), points, outward, near=0.1)
+    share, normals = ground.settle_on_ground(ball(), points, outward, near=0.1)
     assert share == pytest.approx((1.0, 0.0, 0.0, 0.0))
     assert np.linalg.norm(points, axis=1) == pytest.approx((1.0, 1.05, 1.0, 1.5), abs=5e-3)
-    vectors = ground.tangential(np.array([[3.0, 4.0, 0.0]]), share[:1], normals[:1])
+    vectors = ground.remove_normal_part(np.array([[3.0, 4.0, 0.0]]), share[:1], normals[:1])
     assert vectors[0] == pytest.approx((0.0, 4.0, 0.0), abs=1e-9)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from reflowshock.particles.discretisation.incompressibility import SaddlePoint, SolveFailed, solve
+from reflowshock.particles.discretisation.incompressibility import SaddlePoint, SolveFailed, solve_saddle_point
 
 
 def problem(size=60, rows=20, seed=11):
@@ -19,7 +19,7 @@ def test_solution_equals_the_dense_solution():
     a, c = system.operator.toarray(), system.constraint.toarray()
     zero = np.zeros((len(c), len(c)))
     expected = np.linalg.solve(np.block([[a, -c.T], [c, zero]]), np.concatenate((system.load, system.rate)))
-    solution = solve(system)
+    solution = solve_saddle_point(system)
     assert np.concatenate((solution.velocity, solution.pressure)) == pytest.approx(expected, abs=1e-7)
 
 
@@ -27,7 +27,7 @@ def test_stabilised_solution_equals_the_dense_solution():
     system = replace(problem(), stabilisation=0.3 * sparse.identity(20, format="csr"))
     a, c, s = system.operator.toarray(), system.constraint.toarray(), system.stabilisation.toarray()
     expected = np.linalg.solve(np.block([[a, -c.T], [c, s]]), np.concatenate((system.load, system.rate)))
-    solution = solve(system)
+    solution = solve_saddle_point(system)
     assert np.concatenate((solution.velocity, solution.pressure)) == pytest.approx(expected, abs=1e-7)
 
 
@@ -36,4 +36,4 @@ def test_dependent_constraints_are_an_error():
     twice = sparse.vstack((system.constraint, system.constraint[:1]), format="csr")
     contradiction = np.append(system.rate, system.rate[0] + 1.0)
     with pytest.raises(SolveFailed, match="residuals"):
-        solve(SaddlePoint(system.operator, twice, system.load, contradiction))
+        solve_saddle_point(SaddlePoint(system.operator, twice, system.load, contradiction))

@@ -10,8 +10,8 @@ from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.surface_measure import wall_corners
 from reflowshock.particles.core.tetrahedra import cell_volumes, volume_gradients
 from reflowshock.particles.discretisation.discretisation import LinearTetrahedra
-from reflowshock.particles.discretisation.field_transfer import Transfer, interpolation
-from reflowshock.particles.discretisation.inner_tetrahedra import fill
+from reflowshock.particles.discretisation.field_transfer import Transfer, interpolation_matrix
+from reflowshock.particles.discretisation.inner_tetrahedra import fill_with_tetrahedra
 
 CLOUDS = {
     "ball": lambda: sphere_cloud(1.0, 3),
@@ -34,7 +34,7 @@ def jittered(name, amount):
 def test_volume_and_its_gradient_are_those_of_the_surface(name, amount):
     """This includes a non-Delaunay surface (0.3) and a neck far inside the convex hull."""
     body = jittered(name, amount)
-    cells = fill(body)
+    cells = fill_with_tetrahedra(body)
     volume, gradient = body.volume()
     assert cell_volumes(body.points, cells).sum() == pytest.approx(volume, rel=1e-12)
     result = np.zeros_like(body.points)
@@ -46,7 +46,7 @@ def test_volume_and_its_gradient_are_those_of_the_surface(name, amount):
 
 def test_a_neck_is_not_filled_to_its_hull():
     body = jittered("neck", 0.0)
-    volumes = cell_volumes(body.points, fill(body))
+    volumes = cell_volumes(body.points, fill_with_tetrahedra(body))
     assert volumes.min() > -1e-6 * volumes.max()
 
 
@@ -72,7 +72,7 @@ def test_winding_numbers_tell_inside_from_outside():
 def test_linear_fields_are_transferred_exactly():
     body = jittered("cube", 0.1)
     shift = np.random.default_rng(6).uniform(-0.05, 0.05, body.points.shape) * body.cloud.spacing
-    matrix = interpolation(body.points, fill(body), shift)
+    matrix = interpolation_matrix(body.points, fill_with_tetrahedra(body), shift)
     slope = np.array([[1.0, -2.0, 0.5], [0.0, 3.0, 1.0], [2.0, 1.0, -1.0]])
     assert matrix @ (body.points @ slope) == pytest.approx((body.points + shift) @ slope, abs=1e-12)
     assert matrix.sum(axis=1) == pytest.approx(1.0)
@@ -80,12 +80,12 @@ def test_linear_fields_are_transferred_exactly():
 
 def test_a_transfer_keeps_momentum_and_raises_no_energy():
     body = jittered("ball", 0.1)
-    old = LinearTetrahedra.start(body.points, fill(body), 1.0)
+    old = LinearTetrahedra.start(body.points, fill_with_tetrahedra(body), 1.0)
     shift = np.random.default_rng(7).uniform(-0.1, 0.1, body.points.shape) * body.cloud.spacing
     shift[: body.cloud.surface_count] = 0.0
-    values = interpolation(body.points, old.cells, shift)
+    values = interpolation_matrix(body.points, old.cells, shift)
     body.points = body.points + shift
-    new = LinearTetrahedra.start(body.points, fill(body), 1.0)
+    new = LinearTetrahedra.start(body.points, fill_with_tetrahedra(body), 1.0)
     translations = [np.broadcast_to(axis, body.points.shape) for axis in np.eye(3)]
     transfer = Transfer(values, old.mass, new.mass, translations)
     for velocity in (np.random.default_rng(8).normal(size=shift.shape), body.points[:, ::-1] + 1.0):
@@ -100,6 +100,6 @@ def test_a_transfer_keeps_momentum_and_raises_no_energy():
 def test_flipped_edges_of_a_lattice_are_single_cells(count):
     """Surface diagonals of a cube may differ from Delaunay's: no cell is inverted, so cells do not overlap."""
     body = Body.at_rest(box_cloud(1.0, count))
-    volumes = cell_volumes(body.points, fill(body))
+    volumes = cell_volumes(body.points, fill_with_tetrahedra(body))
     assert volumes.min() >= 0.0
     assert volumes.sum() == pytest.approx(body.volume()[0], rel=1e-12)

@@ -7,7 +7,7 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import box_cloud, sphere_cloud
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.ispg.ispg_step import IspgStep
-from reflowshock.particles.ispg.motion_transfer import MovingBody, interpolated_velocity
+from reflowshock.particles.ispg.motion_transfer import MovingBody, interpolate_velocity
 from reflowshock.particles.ispg.nodal_volumes import body_moments
 from reflowshock.particles.parameters.effects import decide_effects, switched
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
@@ -16,7 +16,7 @@ from reflowshock.particles.physics.operators import Inertia, Mass, Viscosity
 from reflowshock.particles.physics.physics import Physics
 from reflowshock.particles.scenes import rebuild as rebuild_module
 from reflowshock.particles.scenes.flow_setup import pad_lines, start_flow
-from reflowshock.particles.scenes.metrics import ledger
+from reflowshock.particles.scenes.metrics import energy_metrics
 from reflowshock.particles.scenes.rebuild import hand_over, rebuild, split_to_rest, touch
 from reflowshock.particles.scenes.reflow import LiquidJoint
 from reflowshock.particles.steps.flow import LiquidFlow
@@ -109,7 +109,7 @@ def test_linear_velocity_fields_are_transferred_exactly():
     flow.body.velocity = 0.7 + flow.body.points @ slope.T
     moving = MovingBody(flow.body, flow.physics, flow.solver)
     points, spacing = rebuild(flow.body).points, flow.body.cloud.spacing
-    velocity = interpolated_velocity(points, [moving.state], spacing)
+    velocity = interpolate_velocity(points, [moving.state], spacing)
     assert velocity == pytest.approx(0.7 + points @ slope.T, abs=1e-12)
 
 
@@ -155,4 +155,4 @@ def test_a_detached_joint_keeps_volume_centre_and_energy_budget(monkeypatch):
     assert sum(drop.solver.first_energy for drop in drops) == flow.solver.first_energy
     for drop in drops:
         drop.step()
-    assert abs(ledger(drops)["energy_imbalance"][0]) < 2e-3
+    assert abs(energy_metrics(drops)["energy_imbalance"][0]) < 2e-3

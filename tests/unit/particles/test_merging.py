@@ -29,7 +29,7 @@ def two_drops(viscosity=0.5, **changes):
     drop = droplet(scene)
     points, aside = np.array(drop.fields[:3]), np.array([0.5 + 0.5 * EDGE * drop.law.spacing, 0.0, 0.0])
     both = np.concatenate((points - aside[:, None], points + aside[:, None]), axis=1)
-    fields = flow.liquid_and_walls(both, np.empty((3, 0)), np.zeros(both.shape[1]), drop.law)
+    fields = flow.make_fields(both, np.empty((3, 0)), np.zeros(both.shape[1]), drop.law)
     fields.u[:] = 0.3 * np.sign(-both[0])
     fields.w[:] = -scene.impact_speed
     surface = drop.surface
@@ -102,6 +102,7 @@ def test_neighbouring_drops_on_a_wall_merge():
     assert surface.volume == pytest.approx(volume, rel=0.01)
 
 
+@pytest.mark.long
 def test_threads_and_a_restart_change_no_merging(every_thread):
     results = []
     for threads in (1, every_thread):

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from reflowshock.particles.core.neighbours import NeighbourList
-from reflowshock.particles.gripc.moving_least_squares import SUPPORT, derivatives, shape_functions
+from reflowshock.particles.gripc.moving_least_squares import SUPPORT, fit_derivatives, fit_shape_functions
 from reflowshock.particles.ispg.stencils import DegenerateStencil
 
 
@@ -16,7 +16,7 @@ def cloud():
 def fit(points, rows, basis):
     neighbours = NeighbourList(SUPPORT[basis], skin=0.3)
     neighbours.update(points)
-    return derivatives(points, np.asarray(rows, np.int32), neighbours, basis)
+    return fit_derivatives(points, np.asarray(rows, np.int32), neighbours, basis)
 
 
 def weights(offsets, support):
@@ -51,7 +51,7 @@ def test_shape_functions_equal_the_mls_approximation(cloud, row):
     values = np.random.default_rng(6).normal(size=len(cloud))
     neighbours = NeighbourList(SUPPORT["linear"], skin=0.3)
     neighbours.update(cloud)
-    fitted = shape_functions(cloud, np.array([row], np.int32), neighbours)
+    fitted = fit_shape_functions(cloud, np.array([row], np.int32), neighbours)
     assert fitted @ values == pytest.approx(mls_value(cloud, values, cloud[row]))
     assert fitted @ cloud == pytest.approx(cloud[[row]], abs=1e-12)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reflowshock.particles.ispg.nodal_volumes import NoNodalVolumes, _solve, fitted_volumes
+from reflowshock.particles.ispg.nodal_volumes import NoNodalVolumes, _solve, fit_volumes
 
 RANDOM = np.random.default_rng(5)
 
@@ -17,14 +17,14 @@ def points(thickness: float) -> np.ndarray:
 def test_volumes_have_the_moments(thickness):
     powers = points(thickness)
     moments = np.array([1.0, 0.02, -0.01, 0.03 * thickness])
-    volumes = fitted_volumes(np.full(40, 0.025), powers, moments, np.zeros(4))
+    volumes = fit_volumes(np.full(40, 0.025), powers, moments, np.zeros(4))
     np.testing.assert_allclose(powers.T @ volumes, moments, rtol=0.0, atol=1e-12)
     assert (volumes > 0.0).all()
 
 
 def test_particles_in_a_plane_have_no_moment_off_it():
     with pytest.raises(NoNodalVolumes, match="too uneven"):
-        fitted_volumes(np.full(40, 0.025), points(0.0), np.array([1.0, 0.0, 0.0, 0.1]), np.zeros(4))
+        fit_volumes(np.full(40, 0.025), points(0.0), np.array([1.0, 0.0, 0.0, 0.1]), np.zeros(4))
 
 
 @pytest.mark.parametrize("index", range(4))
@@ -33,7 +33,7 @@ def test_a_nan_moment_is_an_error(index):
     moments = powers.T @ volumes
     moments[index] = np.nan
     with pytest.raises(NoNodalVolumes):
-        fitted_volumes(volumes, powers, moments, np.zeros(4))
+        fit_volumes(volumes, powers, moments, np.zeros(4))
 
 
 def test_badly_scaled_equations_are_solved_and_dependent_ones_are_not():

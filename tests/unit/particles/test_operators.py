@@ -7,7 +7,7 @@ from reflowshock.particles.core.body import Body
 from reflowshock.particles.core.cloud import box_cloud
 from reflowshock.particles.core.neighbours import NeighbourList
 from reflowshock.particles.discretisation.discretisation import LinearTetrahedra
-from reflowshock.particles.discretisation.inner_tetrahedra import fill
+from reflowshock.particles.discretisation.inner_tetrahedra import fill_with_tetrahedra
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Inertia, Mass, Viscosity
 from reflowshock.particles.steps.interior_shift import SMALLEST_DEPTH, interior_shift
@@ -21,7 +21,7 @@ def body():
 
 
 def discretise(body):
-    return LinearTetrahedra.start(body.points, fill(body), density=5.0)(body)
+    return LinearTetrahedra.start(body.points, fill_with_tetrahedra(body), density=5.0)(body)
 
 
 def power(matrix, field):

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.core.plate import joint_plates
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
-from reflowshock.particles.scenes.orientation import Orientation, canonical, oriented, sizes
+from reflowshock.particles.scenes.orientation import Orientation, canonical, orient, sizes
 from reflowshock.particles.scenes.reflow import solve_joint
 
 RADIUS = 0.24e-3
@@ -62,7 +62,7 @@ def test_the_shape_of_a_mirror_image_is_that_of_its_own_reflow():
     geometry = JointGeometry(0.33e-3, RADIUS, RADIUS, (2e-5, 3e-5), (0.03, 0.05))
     upright, orientation = canonical(geometry)
     assert orientation.mirror
-    direct, image = solve_joint(geometry, SOLDER), oriented(solve_joint(upright, SOLDER), orientation)
+    direct, image = solve_joint(geometry, SOLDER), orient(solve_joint(upright, SOLDER), orientation)
     plate = joint_plates(geometry)[1]
     ring = plate.local(image.surface_points[image.ring_package])
     assert abs(ring[:, 2]).max() < 1e-12

@@ -123,6 +123,7 @@ def test_a_part_says_what_became_of_its_drops(parts, voids, outcome):
     assert Part(nothing, nothing, nothing, nothing, nothing, layers, np.ones(voids)).outcome == outcome
 
 
+@pytest.mark.long
 def test_two_drops_are_printed_to_the_same_bits_after_a_restart(tmp_path):
     scene, calls = printing(), []
 

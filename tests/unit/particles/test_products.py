@@ -4,7 +4,7 @@ import pytest
 
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
-from reflowshock.particles.scenes.products import TIMES, read_shapes, untimed, write_particles, write_shapes
+from reflowshock.particles.scenes.products import TIMES, read_shapes, remove_timings, write_particles, write_shapes
 from reflowshock.particles.scenes.reflow import solve_joint
 
 
@@ -20,7 +20,7 @@ def test_shapes_survive_the_file(tmp_path, shape):
     for name in ("points", "velocity", "pressure", "surface_points", "triangles", "ring_board", "ring_package"):
         assert np.array_equal(getattr(back, name), getattr(shape, name))
     assert back.triangles.dtype == np.int32
-    assert back.metrics == untimed(shape.metrics)
+    assert back.metrics == remove_timings(shape.metrics)
     assert shape.metrics.keys() - back.metrics.keys() == set(TIMES)
     assert back.verdict == shape.verdict
     assert set(back.history) == set(shape.history)

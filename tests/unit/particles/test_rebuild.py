@@ -12,10 +12,10 @@ from reflowshock.particles.scenes.rebuild import CannotRebuild, closed_surface, 
 from reflowshock.particles.surface.cloud_level_set import boundary_loops, cloud_from_level_set
 from reflowshock.particles.surface.level_set import (
     LevelSet,
-    depths,
     extract_surface,
-    relax,
+    measure_depths,
     signed_distance,
+    smooth_on_level_set,
     smooth_union,
     winding_numbers_on,
 )
@@ -44,7 +44,7 @@ def quality(points, triangles):
 def test_the_net_of_a_sphere_is_closed_even_and_near(centre):
     spacing = 0.2 * R
     level = ball(grid_around_ball(centre, R, spacing), centre, R)
-    points, triangles = relax(level, *extract_surface(level), ())
+    points, triangles = smooth_on_level_set(level, *extract_surface(level), ())
     assert boundary_loops(triangles) == ()
     assert len(points) - len(triangles) // 2 == 2  # Euler's formula for a sphere
     assert np.abs(np.linalg.norm(points - centre, axis=1) / R - 1.0).max() < 5e-3
@@ -55,7 +55,7 @@ def test_the_net_converges_with_order_two():
     errors = []
     for spacing in (R / 4, R / 8):
         level = ball(grid_around_ball((0, 0, 0), R, spacing), (0, 0, 0), R)
-        points, triangles = relax(level, *extract_surface(level), ())
+        points, triangles = smooth_on_level_set(level, *extract_surface(level), ())
         errors.append(
             1.0
             - np.einsum("ij,ij", points[triangles[:, 0]], np.cross(*points[triangles[:, 1:]].swapaxes(0, 1)))
@@ -69,10 +69,11 @@ def test_signed_distance_of_a_net_is_that_of_the_sphere():
     spacing = R / 8
     grid = grid_around_ball((0, 0, 0), R, spacing)
     exact = ball(grid, (0, 0, 0), R)
-    points, triangles = relax(exact, *extract_surface(exact), ())
+    points, triangles = smooth_on_level_set(exact, *extract_surface(exact), ())
     assert np.abs(signed_distance(points, triangles, grid).values - exact.values).max() < 0.1 * spacing
 
 
+@pytest.mark.long
 def test_inside_is_what_a_surface_winds_round_where_its_sheets_have_crossed():
     """In the overlap of two balls of one surface the nearest sheet has the wrong orientation."""
     points, triangles = extract_surface(ball(grid_around_ball((0, 0, 0), R, R / 8), (0, 0, 0), R))
@@ -84,7 +85,7 @@ def test_inside_is_what_a_surface_winds_round_where_its_sheets_have_crossed():
     exact = np.minimum(*(np.linalg.norm(nodes - centre, axis=1) - R for centre in (-aside, aside)))
     clear = np.abs(exact) > 0.05 * R
     assert np.array_equal(level.values.ravel()[clear] < 0.0, exact[clear] < 0.0)
-    assert np.array_equal(depths(nodes[clear], *both) > 0.0, exact[clear] < 0.0)
+    assert np.array_equal(measure_depths(nodes[clear], *both) > 0.0, exact[clear] < 0.0)
 
 
 def test_windings_hold_below_vertices_and_edges_however_they_are_numbered():
@@ -101,7 +102,7 @@ def test_windings_hold_below_vertices_and_edges_however_they_are_numbered():
         permutation = np.array(order, np.int32)
         surface = corners[permutation], np.argsort(permutation).astype(np.int32)[sides]
         assert np.array_equal(winding_numbers_on(grid, *surface)[clear], (distance < 0.0)[clear])
-        assert np.array_equal(depths(nodes[clear], *surface) > 0.0, distance[clear] < 0.0)
+        assert np.array_equal(measure_depths(nodes[clear], *surface) > 0.0, distance[clear] < 0.0)
 
 
 def test_smooth_union_closes_gaps_narrower_than_half_its_reach():

@@ -15,11 +15,11 @@ from reflowshock.particles.flows.sph_numerics import SphNumerics
 from reflowshock.particles.flows.vortices import TaylorGreen
 from reflowshock.particles.reference.dam_break import MEASURED, measured_pressure
 from reflowshock.particles.scenes.products import read_flow, write_flow
-from reflowshock.particles.sph.flow import liquid_and_walls
+from reflowshock.particles.sph.flow import make_fields
 from reflowshock.particles.sph.fluid_state import REPRODUCING
 from reflowshock.particles.sph.particle_rates import condition_of, rates_of, solved
 from reflowshock.particles.sph.simulation import Simulation
-from reflowshock.particles.sph.smoothing import KERNELS, beyond_plane, norm, shape, slope
+from reflowshock.particles.sph.smoothing import KERNELS, norm, shape, share_beyond_plane, slope
 from reflowshock.particles.sph.threads import Rows
 from reflowshock.particles.sph_flows.dam_break import dam, solve_dam_break
 from reflowshock.particles.sph_flows.viscous_flows import channel, solve_poiseuille, vortices
@@ -56,8 +56,8 @@ def test_the_kernel_beyond_a_plane_is_that_of_a_lattice_behind_it(kernel):
     levels = norm(kernel, 3, 1.0) / 20.0**3 * np.array([shape(kernel, False, ratio) for ratio in radius[radius < 2.0]])
     planes = np.array([0.0, 0.2, 0.7, 1.5, 2.0])
     sums = [levels[z.ravel()[radius < 2.0] > plane].sum() for plane in planes]
-    assert beyond_plane(kernel, planes) == pytest.approx(sums, abs=2e-3)
-    assert beyond_plane(kernel, planes[[0, -1]]) == pytest.approx([0.5, 0.0], abs=1e-5)
+    assert share_beyond_plane(kernel, planes) == pytest.approx(sums, abs=2e-3)
+    assert share_beyond_plane(kernel, planes[[0, -1]]) == pytest.approx([0.5, 0.0], abs=1e-5)
 
 
 def test_walls_list_the_liquid_alone_and_the_liquid_all():
@@ -140,7 +140,7 @@ def test_the_reproducing_gradient_is_exact_for_linear_densities_at_surfaces_and_
     lattice = np.stack(np.meshgrid(*(np.arange(count) for count in (6, depth, 6)), indexing="ij")).reshape(3, -1)
     moved = np.random.default_rng(2).uniform(-0.2, 0.2, lattice.shape) * (np.array([1.0, depth > 1, 1.0])[:, None])
     slopes = np.array([3.0, 5.0 if dimension == 3 else 0.0, -7.0])
-    fields = liquid_and_walls(law.spacing * (lattice + moved), np.empty((3, 0)), np.zeros(lattice.shape[1]), law)
+    fields = make_fields(law.spacing * (lattice + moved), np.empty((3, 0)), np.zeros(lattice.shape[1]), law)
     fields.density[:] += slopes @ np.array(fields[:3])
     rows = Rows(law, lattice.shape[1])
     rows.update(fields[:3])

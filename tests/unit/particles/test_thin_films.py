@@ -7,12 +7,12 @@ from reflowshock.particles.flows.droplet import Droplet, DropletNumerics
 from reflowshock.particles.sph import flow
 from reflowshock.particles.sph.simulation import Simulation
 from reflowshock.particles.sph.surface_coupling import find_weights
-from reflowshock.particles.sph.thin_films import add_wall_friction, film_sums
+from reflowshock.particles.sph.thin_films import add_wall_friction, sum_film_surface
 from reflowshock.particles.sph_flows.droplet import droplet, liquid_of
 from reflowshock.particles.surface.cloud_level_set import boundary_loops
 from reflowshock.particles.surface.morphological_closing import narrowest_gap
-from reflowshock.particles.surface.remeshing import smoothed, without_dry_spots
-from reflowshock.particles.surface.surface_mesh import on_wall
+from reflowshock.particles.surface.remeshing import cover_dry_spots, smooth_surface
+from reflowshock.particles.surface.surface_mesh import have_reached_wall
 from reflowshock.particles.surface.surface_quality import vertex_normals
 
 INK = {"diameter": 1.0, "density": 1.0, "surface_tension": 1.0, "viscosity": 0.2, "duration": 1.0}
@@ -28,7 +28,7 @@ def film(layers, height):
     law = law._replace(period_x=wide, period_y=wide, sound=1e3, diffusion=0.0, gravity_z=0.0, shifting=0.0)
     along, up = (np.arange(ACROSS) + 0.5) * wide / ACROSS, (np.arange(layers) + 0.5) * height / layers
     points = np.stack(np.meshgrid(along, along, up, indexing="ij")).reshape(3, -1)
-    fields = flow.liquid_and_walls(points, np.empty((3, 0)), np.zeros(points.shape[1]), law)
+    fields = flow.make_fields(points, np.empty((3, 0)), np.zeros(points.shape[1]), law)
     return Simulation(fields, points.shape[1], law)
 
 
@@ -63,7 +63,7 @@ def test_a_film_of_one_particle_feels_the_friction_of_lubrication(height):
     lists = np.arange(0, count * count + 1, count, dtype=np.int32), np.tile(np.arange(count, dtype=np.int32), count)
     weights = np.empty((2, 2, count * count))
     find_weights(points, lists, fields, law, weights)
-    sums = film_sums(points, UP * np.ones_like(points), lists, weights[1, 0], count)
+    sums = sum_film_surface(points, UP * np.ones_like(points), lists, weights[1, 0], count)
     add_wall_friction(sums, fields, law, simulation.rates)
     assert by_images < 0.6 * height**2
     assert -simulation.rates[1].mean() * height**2 / 3.0 == pytest.approx(1.0, abs=0.05)
@@ -78,7 +78,7 @@ def test_a_film_of_two_particles_is_left_to_the_sums_over_pairs():
     lists = np.array([0, simulation.fluids], np.int32), np.arange(simulation.fluids, dtype=np.int32)
     weights = np.empty((2, 2, simulation.fluids))
     find_weights(points, lists, fields, simulation.law, weights)
-    sums = film_sums(points, UP * np.ones_like(points), lists, weights[1, 0], simulation.fluids)
+    sums = sum_film_surface(points, UP * np.ones_like(points), lists, weights[1, 0], simulation.fluids)
     add_wall_friction(sums, fields, simulation.law, simulation.rates)
     assert np.array_equal(simulation.rates, before)
 
@@ -102,8 +102,8 @@ def test_vertices_that_particles_pass_or_leave_behind_follow_them():
 def test_what_faces_the_wall_wets_it_and_a_film_is_not_yet_dry():
     points = np.array([[0.0, 0.0, 0.2], [1.0, 0.0, 0.2], [0.0, 1.0, 0.2]])
     up, down = np.array([[0, 1, 2]], np.int32), np.array([[0, 2, 1]], np.int32)
-    assert on_wall(points, down, 1.0).all() and not on_wall(points, up, 1.0).any()
-    assert on_wall(points - [0.0, 0.0, 0.15], up, 1.0).all()
+    assert have_reached_wall(points, down, 1.0).all() and not have_reached_wall(points, up, 1.0).any()
+    assert have_reached_wall(points - [0.0, 0.0, 0.15], up, 1.0).all()
 
 
 def test_sharp_bends_of_contact_lines_are_blunted_and_round_ones_stay():
@@ -112,10 +112,10 @@ def test_sharp_bends_of_contact_lines_are_blunted_and_round_ones_stay():
     points = np.concatenate(([[0.0, 0.0, 1.0]], np.stack((np.cos(angles), np.sin(angles), 0.0 * angles), axis=1)))
     ring = np.arange(1, 13, dtype=np.int32)
     triangles = np.stack((np.zeros(12, np.int32), ring, np.roll(ring, -1)), axis=1).astype(np.int32)
-    round_one, _ = smoothed(points, triangles, (ring,), (ring,))
+    round_one, _ = smooth_surface(points, triangles, (ring,), (ring,))
     assert np.linalg.norm(round_one[ring], axis=1) == pytest.approx(1.0, abs=1e-12)
     points[3] *= 2.0
-    blunt, _ = smoothed(points, triangles, (ring,), (ring,))
+    blunt, _ = smooth_surface(points, triangles, (ring,), (ring,))
     assert 1.2 < np.linalg.norm(blunt[3]) < 1.8
 
 
@@ -134,11 +134,11 @@ def test_a_dry_spot_smaller_than_a_particle_is_closed():
     corner = np.array([i + 5 * j for j in range(4) for i in range(4)], np.int32)
     triangles = np.concatenate((corner[:, None] + [0, 1, 6], corner[:, None] + [0, 6, 5])).astype(np.int32)
     whole = boundary_loops(triangles)
-    assert without_dry_spots(points, triangles, whole, 1.0) is None
+    assert cover_dry_spots(points, triangles, whole, 1.0) is None
     torn = np.delete(triangles, 10, axis=0)
-    closed = without_dry_spots(points, torn, boundary_loops(torn), 1.0)
+    closed = cover_dry_spots(points, torn, boundary_loops(torn), 1.0)
     assert closed is not None
     assert len(boundary_loops(closed[1])) == 1
     assert vertex_normals(*closed, len(closed[0]))[:, 2].min() > 0.5
     assert len(closed[0]) == 26 and len(closed[1]) == len(triangles) + 2
-    assert without_dry_spots(points, torn, boundary_loops(torn), 0.5) is None
+    assert cover_dry_spots(points, torn, boundary_loops(torn), 0.5) is None

@@ -11,7 +11,7 @@ from reflowshock.workflow.accuracy.command import (
     is_within_tolerance,
     measure,
     read_request,
-    unverified,
+    remark_unverified,
 )
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.cli import main
@@ -23,7 +23,7 @@ from reflowshock.workflow.convergence.tables import as_lines, as_options, legend
 from reflowshock.workflow.kinds import kind_of
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.plan import predicted_costs
-from reflowshock.workflow.store.store import AGAIN, MESSAGE, Store
+from reflowshock.workflow.store.store import MESSAGE, REPETITIONS, Store
 from reflowshock.workflow.store.view import show
 from tests.support.products import record_of
 
@@ -106,7 +106,7 @@ def test_second_call_computes_nothing_and_another_tolerance_only_new_points(done
 def test_cheap_points_are_repeated_and_the_smallest_time_counts(done):
     _, runner, compute, folder = done
     repeated = [key for store, key in compute.computed if store != folder.name]
-    assert repeated.count(runner.points["6 per edge"].key) == AGAIN
+    assert repeated.count(runner.points["6 per edge"].key) == REPETITIONS
     assert runner.points["27 per edge"].key not in repeated
 
 
@@ -215,8 +215,8 @@ def test_plan_is_corrected_by_earlier_runs_in_its_folder(tmp_path):
 
 def test_recommendation_that_was_not_run_has_a_remark(done):
     accuracy = done[0]
-    assert unverified(accuracy) == []
-    (remark,) = unverified(replace(accuracy, recommended=replace(accuracy.recommended, found=None)))
+    assert remark_unverified(accuracy) == []
+    (remark,) = remark_unverified(replace(accuracy, recommended=replace(accuracy.recommended, found=None)))
     assert "was not run (it exceeds the remaining budget)" in remark and "predicted, not measured" in remark
 
 

@@ -38,7 +38,7 @@ def test_the_default_board_deflects_about_as_far_as_its_run_found():
     assert slope == pytest.approx(np.pi / 0.19 * deflection)
 
 
-def test_a_plan_says_what_small_kinematics_would_leave_out():
+def test_a_plan_reports_the_effect_of_small_kinematics():
     effect = shock_effects(read_case(CASE, (), True))["finite_rotation"]
     assert not effect["on"]
     assert "times its thickness" in effect["why"] and "shock.numerics.kinematics = finite" in effect["why"]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from reflowshock.fem.problem.failure import Failure
-from reflowshock.parameters import changed
+from reflowshock.parameters import with_value
 from reflowshock.workflow.case.case import CASES
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.verdict.board_deflection import (
@@ -28,7 +28,7 @@ def judged(peak=2.5e-3, case=JEDEC, shape=None, **parameters):
     failure = Failure.model_validate({"board_deflection": parameters})
     swing = peak * np.sin(np.pi * TIME / TIME[-1]) if shape is None else peak * shape
     history = {"time": TIME, "board_centre": np.outer(swing, [0.0, 0.0, -1.0])}
-    return BoardDeflection().judge(JudgedDrop(changed(case, "shock.failure", failure), {}, history))
+    return BoardDeflection().judge(JudgedDrop(with_value(case, "shock.failure", failure), {}, history))
 
 
 def with_packages(case=JEDEC, **packages):
@@ -61,7 +61,7 @@ def test_the_limit_falls_with_the_constant_of_the_component(component, constant)
 
 def test_the_limit_scales_with_thickness_and_length_of_the_component():
     seat, board = Seat("it", (0.01, 0.01)), JEDEC.board
-    thick = changed(board, "thickness", 2.0 * board.thickness)
+    thick = with_value(board, "thickness", 2.0 * board.thickness)
     assert allowed_deflection(thick, seat, 0, 1.75) == pytest.approx(0.5 * allowed_deflection(board, seat, 0, 1.75))
     longer = Seat("it", (0.04, 0.01))
     assert allowed_deflection(board, longer, 0, 1.75) == pytest.approx(0.5 * allowed_deflection(board, seat, 0, 1.75))
@@ -85,7 +85,7 @@ def test_a_further_package_is_compared_with_the_deflection_of_the_centre():
 
 
 def test_a_local_deflection_has_no_position_factor():
-    off_centre = changed(JEDEC, "board.centre", (0.01, 0.0))
+    off_centre = with_value(JEDEC, "board.centre", (0.01, 0.0))
     assert "the package: " in judged(case=off_centre).why and "r = 1;" in judged(case=off_centre).why
     assert judged(case=off_centre).limit == judged().limit
     assert "packages" not in judged(case=with_packages(off_centre, big={"at": (0.016, 0.0)})).why

@@ -80,7 +80,7 @@ BAD_VALUES = {
         'shock.failure.layer_von_mises={ limit = "-80 MPa", source = "a test" }',
         ["shock.failure.layer_von_mises.limit", "out of range", "> 0 MPa"],
     ),
-    "limit that is no table": (
+    "limit that is not a table": (
         "shock.failure.peel_stress=80 MPa",
         ["shock.failure.peel_stress", "must be a table"],
     ),

@@ -14,7 +14,7 @@ from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.examples import EXAMPLES
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.pipeline.schema import case_schema
-from reflowshock.workflow.store.folders import locked
+from reflowshock.workflow.store.folders import lock_folder
 from tests.support.case_schema import validate
 from tests.support.command_parser import commands, parse
 from tests.support.workflow_command import command_line
@@ -148,20 +148,20 @@ def test_clean_removes_run_folders_only(call, tmp_path):
     (precious / "inputs/case.json").write_text("{}")
     assert "nothing to remove" in call("clean", str(CASE), "--out", str(precious))[1]
     assert (precious / "inputs/case.json").exists()
-    with locked(tmp_path / "run", "run", "bga_drop"):
+    with lock_folder(tmp_path / "run", "run", "bga_drop"):
         pass
     assert call("clean", str(CASE), "--out", str(tmp_path / "run"))[0] == 0
     assert not (tmp_path / "run").exists()
 
 
 def test_another_case_is_not_cleaned(call, tmp_path):
-    with locked(tmp_path / "run", "run", "other"):
+    with lock_folder(tmp_path / "run", "run", "other"):
         pass
     code, _, errors = call("clean", str(CASE), "--out", str(tmp_path / "run"))
     assert (code, "contains the run of other" in errors) == (2, True)
 
 
-def test_nothing_is_written_beside_files_of_a_user(call, tmp_path):
+def test_nothing_is_written_next_to_files_of_a_user(call, tmp_path):
     (tmp_path / "mine.toml").write_bytes(CASE.read_bytes())
     for command in ("run", "clean"):
         call(command, "mine.toml", "--out", ".")
@@ -169,7 +169,7 @@ def test_nothing_is_written_beside_files_of_a_user(call, tmp_path):
 
 
 def test_a_run_folder_in_use_is_left_alone(call, tmp_path):
-    with locked(tmp_path / "busy", "run", "bga_drop"):
+    with lock_folder(tmp_path / "busy", "run", "bga_drop"):
         before = sorted(tmp_path.rglob("*"))
         code, _, errors = call("run", str(CASE), "--out", str(tmp_path / "busy"))
     assert (code, "another run is active" in errors) == (1, True)

@@ -17,7 +17,7 @@ from reflowshock.workflow.pipeline.resources import stage_resources
 from reflowshock.workflow.process.launch import LAUNCHER, mpi_command
 
 CASES = Path(__file__).resolve().parents[3] / "cases"
-SAID = """\
+SNAKEMAKE_LOG = """\
 rule shock:
     jobid: 2
 
@@ -100,14 +100,14 @@ def test_profile_of_the_user(tmp_path, monkeypatch):
         ("a: b: c", "cannot be read"),
     ],
 )  # fmt: skip
-def test_wrong_profiles_are_told(tmp_path, text, said):
+def test_wrong_profiles_are_reported(tmp_path, text, said):
     (tmp_path / FILE).write_text(text)
     with pytest.raises(CaseError) as error:
         read_profile(tmp_path)
     assert said in str(error.value)
 
 
-def test_a_folder_without_profile_is_told(tmp_path):
+def test_a_folder_without_profile_is_reported(tmp_path):
     with pytest.raises(CaseError, match="is not a profile"):
         read_profile(tmp_path / "nowhere")
 
@@ -118,7 +118,7 @@ def test_a_profile_is_nothing_for_this_machine(tmp_path):
         executor_for(ExecutorName.LOCAL, tmp_path, 3, False, [])
 
 
-def test_missing_programs_are_told_before_anything_runs(monkeypatch):
+def test_missing_programs_are_reported_before_anything_runs(monkeypatch):
     monkeypatch.setattr(checks.shutil, "which", lambda _: None)
     monkeypatch.setattr(checks, "find_spec", lambda _: None)
     with pytest.raises(CaseError) as error:
@@ -161,12 +161,12 @@ def test_what_jobs_say_is_shown_as_it_comes(tmp_path, capfd):
     assert capfd.readouterr().out == "  shock on 2 ranks …\nhalf a line\n"
 
 
-def test_jobs_that_ended_without_a_word_are_told(tmp_path):
+def test_jobs_that_ended_silently_are_reported(tmp_path):
     said = tmp_path / "snakemake.txt"
     assert failures_of(said) == {}
     said.write_text("WorkflowError: the account is invalid")
     assert failures_of(said) == {}
-    said.write_text(SAID)
+    said.write_text(SNAKEMAKE_LOG)
     assert failures_of(said) == {
         "shock-1": "SLURM-job '7' failed, SLURM status is: 'TIMEOUT'. Reason: Unknown.",
         "reflow-2": "SLURM sbatch failed. The error message was 'sbatch: error: Memory specification can not"

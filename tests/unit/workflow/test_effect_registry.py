@@ -20,7 +20,7 @@ from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.cli import app
 from reflowshock.workflow.effects.page import effects_table
 from reflowshock.workflow.effects.registry import effect_of, registry
-from reflowshock.workflow.effects.table import cost_shares, measured, per_cent
+from reflowshock.workflow.effects.table import cost_shares, per_cent, read_measured_ratios
 from reflowshock.workflow.kinds import kind_of
 from reflowshock.workflow.pipeline.reader import read_case
 from tests.support.workflow_command import SMALL_CASE
@@ -52,7 +52,7 @@ def printed(case) -> list[str]:
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_a_plan_tells_scenes_apart(name):
+def test_a_plan_distinguishes_scenes(name):
     path, *settings = SCENES[name]
     lines = []
     for setting in settings:
@@ -81,15 +81,15 @@ def test_what_yields_turns_or_is_fine_costs_and_what_is_coarse_saves():
     assert shares["finite_rotation"] > 0.1 and 0.2 < shares["plasticity"] < 1.0
     assert shares["mass_scaling"] < 0.0 < shares["identical_joints"]
     assert 0.0 < shares["gravity_in_the_shock"] < 0.1
-    assert set(measured()) - {"damping_stiffness"} <= set(registry())
+    assert set(read_measured_ratios()) - {"damping_stiffness"} <= set(registry())
 
 
 def test_shares_of_what_is_on_are_of_the_whole():
     """On, an effect that costs r times the rest is the share 1 - 1 / r of the stage; off, it would add r - 1."""
     acting, left_out = (read_case(DROP, [f"gravity={switch}"], True) for switch in ("on", "off"))
     on, off = (cost_shares(case, kind_of(case).forecast(case).effects)["gravity"] for case in (acting, left_out))
-    assert off == pytest.approx(measured()["gravity"] - 1.0)
-    assert on == pytest.approx(1.0 - 1.0 / measured()["gravity"])
+    assert off == pytest.approx(read_measured_ratios()["gravity"] - 1.0)
+    assert on == pytest.approx(1.0 - 1.0 / read_measured_ratios()["gravity"])
 
 
 @pytest.mark.parametrize(

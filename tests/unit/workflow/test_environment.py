@@ -81,7 +81,7 @@ def test_temporary_files_go_where_they_can(tmp_path, nowhere, monkeypatch):
     assert variables["TMPDIR"] == str(tmp_path)
 
 
-def test_nowhere_to_write_is_told(nowhere, monkeypatch):
+def test_missing_write_access_is_reported(nowhere, monkeypatch):
     monkeypatch.setattr(environment, "TEMPORARY", (nowhere,))
     with pytest.raises(EnvironmentProblem, match=r"no folder for temporary files can be written to; tried: .*folder"):
         complete({"TMPDIR": nowhere})
@@ -124,7 +124,7 @@ def test_several_ranks_are_refused_by_the_first():
         (resource.RLIMIT_NOFILE, 16, r"only 16 files may be open \(ulimit -n\), at least 64 are needed"),
     ],
 )
-def test_limits_of_the_shell_that_are_too_small_are_told(monkeypatch, number, soft, words):
+def test_too_small_limits_of_the_shell_are_reported(monkeypatch, number, soft, words):
     real = resource.getrlimit
     monkeypatch.setattr(resource, "getrlimit", lambda one: (int(soft), int(soft)) if one == number else real(one))
     monkeypatch.setattr(resource, "setrlimit", lambda one, limits: None)
@@ -141,7 +141,7 @@ def test_more_files_are_asked_for(monkeypatch):
     assert asked == [(resource.RLIMIT_NOFILE, (environment.TARGET_FILES, 100_000))]
 
 
-def test_threads_that_cannot_be_started_are_told(monkeypatch):
+def test_threads_that_cannot_start_are_reported(monkeypatch):
     def refuse(self):
         raise RuntimeError("can't start new thread")
 

@@ -58,7 +58,7 @@ def test_words(error, words):
     assert describe_error(error, Path("/where")) == words
 
 
-def test_what_is_behind_an_error_tells():
+def test_the_cause_of_an_error_decides():
     behind = OSError(errno.ENOSPC, "x", "/a")
     assert describe_error(raised(ValueError("cannot write"), behind)) == "no space left on the device while writing /a"
 
@@ -98,7 +98,7 @@ def test_details_go_to_a_temporary_file_without_a_run(tmp_path, monkeypatch, cap
     assert f"(details: {path})" in capsys.readouterr().err
 
 
-def test_the_last_lines_are_said_where_no_file_can_be_written(monkeypatch, capsys):
+def test_the_last_lines_are_printed_if_no_file_can_be_written(monkeypatch, capsys):
     monkeypatch.setattr("tempfile.tempdir", "/proc/nowhere")
     report_error(raised(ZeroDivisionError("by zero")))
     lines = capsys.readouterr().err.splitlines()

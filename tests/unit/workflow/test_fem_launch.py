@@ -2,12 +2,12 @@
 
 import json
 
-from reflowshock.workflow.process.fem_launch import _pass_on
+from reflowshock.workflow.process.fem_launch import _handle_line
 
 
 def test_progress_and_warnings_are_passed_on_and_other_words_are_not(caplog):
     messages = []
     for line in (json.dumps({"warning": "a file is broken"}), "scheme: held velocity", '{"progress": 0.25, "time": 1}'):
-        _pass_on(line, messages.append)
+        _handle_line(line, messages.append)
     assert messages == [0.25]
     assert [record.message for record in caplog.records] == ["a file is broken"]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reflowshock.parameters import changed
+from reflowshock.parameters import with_value
 from reflowshock.workflow.board_drop.fine_joints import (
     FineJoints,
     most_stressed,
@@ -66,7 +66,7 @@ def test_coarse_joints_are_an_effect_of_what_is_not_fine(chosen, direction, need
     case = read_case(SMALL_CASE)
     coupling = case.shock.coupling.model_copy(update=parameters)
     assert needs_coarse_joints(coupling) is needed
-    effect = of_joint_meshes(changed(case, "shock.coupling", coupling))["coarse_joints"]
+    effect = of_joint_meshes(with_value(case, "shock.coupling", coupling))["coarse_joints"]
     assert effect["on"] is needed
     assert effect["why"]
 

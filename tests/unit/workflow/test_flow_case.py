@@ -195,10 +195,10 @@ def test_plan_shows_the_cost_of_both_devices_and_what_takes_a_day():
 def test_shear_dependent_viscosity_raises_the_predicted_cost():
     case = read_case(IMPACT, CARREAU, True)
     (effect,) = (effect for effect in kind_of(case).effects if effect.name == "shear_dependent_viscosity")
-    with_, without = forecast(case), forecast(effect.other_way(case, True))
+    with_, without = forecast(case), forecast(effect.toggled(case, True))
     assert with_.effects[effect.name]["on"] and not without.effects[effect.name]["on"]
     assert 1.2 < with_.seconds["particles"] / without.seconds["particles"] < 1.4
-    assert effect.other_way(case, False) is None
+    assert effect.toggled(case, False) is None
 
 
 def test_viscosity_limits_the_time_step_of_fine_flows():

@@ -109,7 +109,7 @@ def test_a_group_leaves_what_it_has_not_used(tmp_path):
     assert list(gate._left(tmp_path)) == []
 
 
-def test_bytes_are_told_in_their_unit():
+def test_bytes_are_formatted_with_their_unit():
     assert [bytes_text(number) for number in (3.1e12, 23.4e9, 150e9, 5e5)] == ["3.1 TB", "23 GB", "150 GB", "0.5 MB"]
 
 
@@ -200,7 +200,7 @@ def test_a_message_is_one_line_of_what_can_be_seen(tmp_path):
 
 
 @pytest.mark.parametrize("kind", [kind.case for kind in KINDS], ids=lambda kind: kind.__name__)
-def test_defaults_are_what_their_text_says(kind):
+def test_defaults_equal_their_text(kind):
     """A line of a case file that repeats a default changes nothing."""
     for model in _reachable(kind):
         for name, field in model.model_fields.items():

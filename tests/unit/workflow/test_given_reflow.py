@@ -55,7 +55,7 @@ def test_nothing_is_reflowed_and_records_tell_what_was_given(run):
     assert {row[1] for row in joint_tables.verdicts(run.folder)["rows"]} == {"given"}
 
 
-def test_others_are_judged_beside_them():
+def test_other_joints_are_judged_with_them():
     values = {"max_width": 5e-4, "width_error": 1e-3, "volume_drift": 2e-12}
     flowed = {"shape": "A1", "metrics": {name: {"value": value} for name, value in values.items()}}
     imported = {"given": "a2.stl", "verdict": "given", "metrics": {"max_width": {"value": 6e-4}}}

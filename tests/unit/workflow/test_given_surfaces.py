@@ -53,7 +53,7 @@ def read(case_file: Path, **surfaces: str):
     return read_case(case_file, ["package.standoff=0.35 mm", "warpage.corner=0 mm", *settings])
 
 
-def test_files_are_beside_the_case_and_count_by_what_they_hold(case_file):
+def test_files_are_relative_to_the_case_and_identified_by_content(case_file):
     case = read(case_file, A4="a4.stl")
     assert case.files["package.surfaces.A4"] == case_file.parent / "a4.stl"
     assert display_values(case)["package.surfaces.A4"] == str(case_file.parent / "a4.stl")

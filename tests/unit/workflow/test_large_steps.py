@@ -25,6 +25,6 @@ def test_steps_of_a_case(settings, expected):
     assert again.solder.numerics == case.solder.numerics
 
 
-def test_a_table_that_is_none_is_refused_as_ever():
+def test_an_invalid_table_is_rejected():
     with pytest.raises(ValueError, match="solder"):
         read_case(SMALL_CASE, (*HEATED, "solder=3"), oversubscribe=True)

@@ -43,13 +43,13 @@ def test_the_last_words_of_a_failure_are_kept(tmp_path):
         )
 
 
-def test_a_failure_that_the_program_tells_is_told_alone(tmp_path):
+def test_the_error_message_of_a_program_is_reported_alone(tmp_path):
     program = "import sys; sys.exit('error: no equilibrium at step 7')"
     with pytest.raises(LaunchError, match=r"^no equilibrium at step 7$"):
         launch([sys.executable, "-c", program], print, tmp_path / "log.txt")
 
 
-def test_all_that_a_program_tells_of_a_failure_is_told(tmp_path):
+def test_all_lines_of_an_error_message_are_reported(tmp_path):
     lines = ["a warning", "error: rank 1: ", *(f"line {k}" for k in range(30)), "broken; last checkpoint: folder"]
     program = f"import sys; sys.exit({chr(10).join(lines)!r})"
     with pytest.raises(LaunchError, match=r"(?s)^rank 1: .*line 0\n.*; last checkpoint: folder$"):
@@ -75,7 +75,7 @@ def test_a_traceback_stays_in_the_log(tmp_path, raising, words):
     assert "Traceback" in log.read_text(encoding="utf-8")
 
 
-def test_a_program_that_raises_tells_what_alone(tmp_path):
+def test_an_exception_of_a_program_is_reported_without_traceback(tmp_path):
     log = tmp_path / "log.txt"
     with pytest.raises(LaunchError, match=r"exit code 1: ModuleNotFoundError: .* 'nothing' \(details: .*\)$"):
         launch([sys.executable, "-c", "import nothing"], print, log)
@@ -90,7 +90,7 @@ def test_a_program_that_the_system_ends(tmp_path, number, words):
         launch([sys.executable, "-c", program], print, tmp_path / "log.txt")
 
 
-def test_words_that_a_program_leaves_in_a_file_are_told(tmp_path):
+def test_an_error_message_in_a_file_is_reported(tmp_path):
     program = "import pathlib, sys; pathlib.Path(sys.argv[1]).write_text('error: rank 1 has died\\n'); sys.exit(1)"
     with pytest.raises(LaunchError, match=r"^rank 1 has died$"):
         launch([sys.executable, "-c", program, str(tmp_path / "error.txt")], print, tmp_path / "log.txt")

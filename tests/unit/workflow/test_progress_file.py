@@ -5,15 +5,15 @@ import json
 import pytest
 
 from reflowshock.workflow.process import progress_file
-from reflowshock.workflow.process.progress_file import read_progress, tell_in, teller
+from reflowshock.workflow.process.progress_file import progress_writer, read_progress, write_progress_to
 from reflowshock.workflow.process.terminal import progress_bar
-from reflowshock.workflow.store.folders import is_busy, locked
+from reflowshock.workflow.store.folders import is_busy, lock_folder
 
 
 @pytest.fixture(autouse=True)
 def told(monkeypatch, tmp_path):
     monkeypatch.setenv(progress_file.VARIABLE, "")
-    tell_in(tmp_path)
+    write_progress_to(tmp_path)
 
 
 def test_a_bar_is_seen_from_elsewhere(tmp_path, monkeypatch):
@@ -28,7 +28,7 @@ def test_a_bar_is_seen_from_elsewhere(tmp_path, monkeypatch):
 
 
 def test_it_is_not_written_more_often_than_looked_at(tmp_path):
-    tell = teller("shock")
+    tell = progress_writer("shock")
     tell(0.5, "")
     assert read_progress(tmp_path).share == 0.0
 
@@ -43,13 +43,13 @@ def test_a_damaged_file_is_no_progress(tmp_path, text):
 
 def test_a_place_that_cannot_be_written_is_no_reason_to_end(tmp_path, monkeypatch):
     monkeypatch.setenv(progress_file.VARIABLE, str(tmp_path / "gone" / "progress.json"))
-    teller("shock")(0.5, "")
+    progress_writer("shock")(0.5, "")
     assert read_progress(tmp_path / "gone") is None
 
 
 def test_a_folder_is_busy_while_somebody_works_in_it(tmp_path):
     folder = tmp_path / "run"
     assert not is_busy(folder)
-    with locked(folder, "run", "mine"):
+    with lock_folder(folder, "run", "mine"):
         assert is_busy(folder)
     assert not is_busy(folder)

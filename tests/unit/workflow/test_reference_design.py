@@ -5,7 +5,7 @@ import json
 import pytest
 
 from reflowshock.fem.problem.failure import Failure
-from reflowshock.parameters import changed
+from reflowshock.parameters import with_value
 from reflowshock.problem import Problem
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.run import Findings, StageError, at_most, metric
@@ -51,7 +51,7 @@ def fault(folder, *settings) -> Problem:
 
 def judged(reference_metrics, **changes):
     failure = Failure.model_validate({"reference": {"run": "runs/base", **changes}})
-    drop = JudgedDrop(changed(POINT.case, "shock.failure", failure), METRICS, {}, (), reference_metrics)
+    drop = JudgedDrop(with_value(POINT.case, "shock.failure", failure), METRICS, {}, (), reference_metrics)
     return {name: ReferenceRatio(name).judge(drop) for name in RATIOS}
 
 

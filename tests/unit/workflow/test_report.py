@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from reflowshock.fem.problem.failure import Failure
-from reflowshock.parameters import changed
+from reflowshock.parameters import with_value
 from reflowshock.workflow.package_report import joint_tables
 from reflowshock.workflow.package_report.shock import ranking_mode
 from reflowshock.workflow.pipeline.reader import read_case
@@ -74,7 +74,7 @@ def test_joints_tell_their_verdict_and_by_what(history):
     yielding = history | {"plastic_work_board": work, "plastic_work_package": 0.5 * work}
     joints = [{"name": name, **JOINT} for name in ("A9", "A10")]
     limits = {"peel_stress": {"limit": 8e6, "source": "us"}, "layer_plastic_work": {"limit": 3e5, "source": "us"}}
-    case = changed(read_case(SMALL_CASE), "shock.failure", Failure.model_validate(limits))
+    case = with_value(read_case(SMALL_CASE), "shock.failure", Failure.model_validate(limits))
     verdicts = verdict_of(JudgedDrop(case, {}, yielding))["joints"]
     table = joint_tables.ranked_joints(yielding, joints, verdicts)
     assert table["head"][5] == "plastic work, 25 µm layer [kJ/m³]"

@@ -12,11 +12,11 @@ import pytest
 
 from reflowshock.workflow.package_report.scenes import residual_scene
 from reflowshock.workflow.report.bodies import body_group
-from reflowshock.workflow.report.charts import MOST_POINTS, Axis, Chart, Series, thinned
+from reflowshock.workflow.report.charts import MOST_POINTS, Axis, Chart, Series, thin_samples
 from reflowshock.workflow.report.colours import SCALES, colour_at, ink_on
 from reflowshock.workflow.report.field_series import FieldSeries
 from reflowshock.workflow.report.page_data import PageData
-from reflowshock.workflow.report.scene import FINEST, Field, Group, Scene, boundary, decimated, kept_frames
+from reflowshock.workflow.report.scene import FINEST, Field, Group, Scene, boundary, decimate, kept_frames
 from reflowshock.workflow.report.template import ASSETS, SCRIPTS, write_page
 
 HOSTILE = '</script><script>alert("1")</script><img src=x onerror=alert(2)>\x1b[31m & "\' {{ 7*7 }}'
@@ -63,7 +63,7 @@ def test_a_fine_body_is_made_coarser_with_its_fields():
     part = np.zeros(len(points), int)
     fine = Group("fine", points, faces, part, displacement=points[None], values={"x": points[None, :, 0]})
     plain = Group("plain", points[:4], np.array([[0, 1, 2]]), part[:4])
-    coarse, same = decimated([fine, plain], 5000)
+    coarse, same = decimate([fine, plain], 5000)
     assert same is plain and 2000 < coarse.triangles <= 5000
     assert coarse.displacement[0] == pytest.approx(coarse.points)
     assert coarse.values["x"][0] == pytest.approx(coarse.points[:, 0])
@@ -98,10 +98,10 @@ def test_a_long_line_keeps_its_peaks():
     x = np.linspace(0.0, 1.0, 100_000)
     y = np.sin(40 * x)
     y[[31_415, 27_182]] = [9.0, -9.0]
-    kept_x, kept_y = thinned(x, y)
+    kept_x, kept_y = thin_samples(x, y)
     assert len(kept_y) <= MOST_POINTS and (kept_y.max(), kept_y.min()) == (9.0, -9.0)
     assert (kept_x[0], kept_x[-1]) == (0.0, 1.0) and np.all(np.diff(kept_x) > 0)
-    assert thinned(x[:10], y[:10])[1] is not None and len(thinned(x[:10], y[:10])[0]) == 10
+    assert thin_samples(x[:10], y[:10])[1] is not None and len(thin_samples(x[:10], y[:10])[0]) == 10
 
 
 def test_equal_arrays_are_kept_once():
@@ -211,7 +211,7 @@ def test_a_page_allows_its_own_script_and_nothing_else(tmp_path):
     assert not re.search(r'(src|href)="(?!data:|#)', page)
 
 
-def test_a_page_without_results_says_what_was_not_run(tmp_path):
+def test_a_page_without_results_lists_missing_stages(tmp_path):
     page = page_of(tmp_path, not_run=["surface", "shock"], healthy=False, missed=["energy balance error"])
     assert "This run is incomplete; stages not run: surface, shock." in page
     assert "A health check failed: energy balance error." in page

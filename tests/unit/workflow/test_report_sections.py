@@ -34,7 +34,7 @@ def test_faces_are_the_underside_and_the_board_below_it(structure):
     assert np.isnan(package.at(np.array([2 * HALF]), np.array([0.0]))).all()
 
 
-def test_warpage_is_told_in_words_and_by_load_step(structure):
+def test_warpage_is_described_in_a_sentence_and_by_load_step(structure):
     gaps = (BOW["package"] - BOW["board"]) * (X**2 + Y**2) / (2 * HALF**2) / MICRO
     words = warpage.in_words(structure)
     assert "70.0 µm for the package underside and 12.0 µm for the board" in words
@@ -56,7 +56,7 @@ def test_warpage_is_drawn(structure):
     assert len(gaps.series) == 2
 
 
-def test_neighbours_are_told_from_the_package_by_their_parts():
+def test_neighbours_are_distinguished_from_the_package_by_their_parts():
     parts = [
         "solder@A1",
         "substrate",
@@ -126,7 +126,7 @@ def history_of(*peaks: float) -> dict[str, np.ndarray]:
             "peel_package": 0.5 * stress}  # fmt: skip
 
 
-def test_the_shape_effect_is_that_of_the_critical_joint():
+def test_the_shape_effect_belongs_to_the_critical_joint():
     real, flat = history_of(40e6, 90e6, 50e6, 60e6), history_of(40e6, 75e6, 50e6, 80e6)
     joints = [{"name": name, "standoff": 0.3e-3} for name in NAMES]
     words = shape_effect.in_words(real, flat)
@@ -145,7 +145,7 @@ def record(name: str, **others) -> dict:
     return pad | others
 
 
-def test_of_joints_that_share_a_shape_the_worst_mesh_is_told():
+def test_the_worst_mesh_of_equal_joints_is_reported():
     joints = [
         record("A4", method="swept", volume_error=1e-4, minimum_scaled_jacobian=0.7, shape_deviation=1e-6),
         record("A3", method="swept", volume_error=-2e-3, minimum_scaled_jacobian=0.5, shape_deviation=3e-6),
@@ -188,7 +188,7 @@ def test_maps_show_what_the_joints_have():
     assert tilt.cells[0]["full"] == "1 mrad" and tilt.cells[0]["text"] == "1.00"
 
 
-def test_small_kinematics_are_told_where_they_matter():
+def test_small_kinematics_are_reported_where_they_matter():
     metrics = {
         "peak_neglected_strain": {"value": 8e-3, "unit": ""},
         "peak_board_strain": {"value": 2.2e-3, "unit": ""},
@@ -200,7 +200,7 @@ def test_small_kinematics_are_told_where_they_matter():
     assert shock.kinematics_note({"peak_neglected_strain": {"value": 1e-6, "unit": ""}}, "small") == ""
 
 
-def test_costs_stand_beside_the_published_ones():
+def test_costs_are_listed_with_the_published_ones():
     model = {"window": 80e-9, "step": 10e-9, "substeps": 8, "windows": 100, "ranks": 2}
     dns = {"model": model | {"mode": "dns", "elements": {"dns": 1000}}, "timings": {"windows": 200.0}, "metrics": {}}
     ours = {

@@ -143,7 +143,7 @@ GALERKIN = "solder.numerics.scheme=ispg"
         (["joint.path={standoff='0.5 mm',speed='0 mm/s'}"], ["joint.path.speed", "> 0"]),
         (
             ["joint.path={standoff='0.5 mm',speed='100 mm/s',steps=4}", GALERKIN, "solder.effects.inertia=on"],
-            ["joint.path.steps = 4", "in one go"],
+            ["joint.path.steps = 4", "without stops"],
         ),
         (
             ["joint.path={standoff='0.5 mm',speed='1000 mm/s'}", GALERKIN, "solder.effects.inertia=on"],

@@ -32,7 +32,7 @@ def test_service_condition_damping_and_method(tmp_path):
     assert shock.damping.coefficients[1] == pytest.approx(0.01 / (3.14159265 * 1e3))
 
 
-def test_table_lies_beside_the_case(tmp_path):
+def test_the_table_is_relative_to_the_case(tmp_path):
     (tmp_path / "drop.csv").write_text("time [ms], acceleration [G]\n0, 0\n0.25, 1500\n0.5, 0\n")
     case = read_case(case_with(tmp_path, 'table = "drop.csv"\n'))
     assert case.shock.table == str((tmp_path / "drop.csv").resolve())
@@ -142,7 +142,7 @@ def test_an_automatic_duration_is_at_most_a_period_after_the_pulse():
 
 
 @pytest.mark.parametrize(("kinematics", "measured"), [("corotational", 2.05e-3), ("small", 3.05e-3)])
-def test_expected_duration_is_that_of_the_default_case(kinematics, measured):
+def test_expected_duration_agrees_with_the_default_case(kinematics, measured):
     """Duration at which its run ended, see cases/jedec_bga/README.md."""
     case = read_case(CASES / "jedec_bga" / "case.toml", [f"shock.numerics.kinematics={kinematics}"])
     assert expected_duration(case) == pytest.approx(measured, rel=0.1)

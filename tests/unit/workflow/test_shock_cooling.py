@@ -10,7 +10,7 @@ from tests.support.workflow_command import SMALL_CASE
 COOLED = ["thermal.effects.residual_stress=on", "thermal.effects.flexible=off", "shock.numerics.plasticity=on"]
 
 
-def test_checks_of_all_coolings_are_told(tmp_path):
+def test_checks_of_all_coolings_are_reported(tmp_path):
     for number, name in enumerate(("identical_residual_two_scale", "residual", "residual_two_scale")):
         (tmp_path / name).mkdir()
         result = {"metrics": {"cooling_iterations": number}, "health": {"cooling_force_residual": {"ok": number != 1}}}

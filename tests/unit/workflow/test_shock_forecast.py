@@ -56,7 +56,7 @@ def test_copper_at_its_true_mass_takes_a_level_of_its_own():
     assert shock.levels[-1].step <= 0.9 * forecast_parts(read_case(SMALL_CASE))["copper"].critical_step
 
 
-def test_scaled_masses_follow_the_step_of_the_others_or_a_wanted_one():
+def test_scaled_masses_follow_the_step_of_the_others_or_a_required_one():
     plain = forecast_parts(read_case(SMALL_CASE, ["shock.numerics.mass_scaled=[]"]))
     scaled = forecast_parts(read_case(SMALL_CASE, ['shock.numerics.mass_scaled=["copper"]']))
     others = min(part.critical_step for name, part in plain.items() if name != "copper")
@@ -71,7 +71,7 @@ def test_one_level_is_one_ratio():
 
 
 @pytest.mark.parametrize("setting", ["shock.numerics.plasticity=on", "shock.numerics.kinematics=finite"])
-def test_what_has_a_path_is_driven_by_held_velocity(setting):
+def test_path_dependent_models_use_held_velocity(setting):
     shock = predicted(setting)
     assert shock.scheme == "held_velocity"
     assert shock.levels[0].parts == ("board",)
@@ -96,7 +96,7 @@ def test_levels_along_a_path_have_layers_of_solder_with_the_copper():
 @pytest.mark.parametrize(
     "setting", ["shock.coupling.levels=1", "shock.damping.mass_coefficient=10 Hz", "shock.coupling.scheme=impulse"]
 )
-def test_what_else_acts_leaves_no_levels_along_a_path(setting):
+def test_other_effects_exclude_levels_of_path_dependent_models(setting):
     shock = predicted(*PATH, setting)
     assert [level.count for level in shock.levels] == [1, shock.substeps]
 
@@ -127,7 +127,7 @@ def test_no_more_levels_than_the_kernels_have_paces():
     assert MOST_LEVELS == PACES
 
 
-def test_the_wanted_scheme_is_taken():
+def test_the_requested_scheme_is_used():
     assert predicted("shock.coupling.scheme=held_velocity").scheme == "held_velocity"
 
 

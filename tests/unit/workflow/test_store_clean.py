@@ -7,10 +7,10 @@ from reflowshock.workflow.jobs.batch import show_products
 from reflowshock.workflow.process.error_exit import LOG, LOGS
 from reflowshock.workflow.run import clean
 from reflowshock.workflow.store import view
-from reflowshock.workflow.store.folders import locked, remove_own
+from reflowshock.workflow.store.folders import lock_folder, remove_program_files
 from reflowshock.workflow.store.state import examine
 from reflowshock.workflow.store.store import Store
-from reflowshock.workflow.store.view import remove_unused, withdraw_all
+from reflowshock.workflow.store.view import remove_all_links, remove_unused
 from tests.support.products import OTHER, POINT, make, shown_run
 
 NAMES = POINT.case.pipeline.names
@@ -22,12 +22,12 @@ def store(tmp_path):
 
 
 def test_all_is_removed_where_nothing_is_a_users(store, monkeypatch):
-    withdraw_all(store)
-    assert remove_own(store.folder) == []
+    remove_all_links(store)
+    assert remove_program_files(store.folder) == []
     assert not store.folder.exists()
     store.folder.mkdir()
     monkeypatch.chdir(store.folder)
-    assert remove_own(store.folder) == []
+    assert remove_program_files(store.folder) == []
     assert store.folder.is_dir()
 
 
@@ -36,7 +36,7 @@ def test_a_store_that_is_a_link_is_not_followed(store, tmp_path):
     store.home.rename(precious)
     store.home.symlink_to(precious)
     with pytest.raises(CaseError, match="is a link"):
-        remove_own(store.folder)
+        remove_program_files(store.folder)
     assert precious.is_dir()
 
 
@@ -78,7 +78,7 @@ def test_a_users_logs_stay(store):
 def study(tmp_path):
     """The folder of a study of two points, with a table of its own; one of them was also repeated for its times."""
     study = Store(tmp_path / "study")
-    with locked(study.folder, "study", "pads"):
+    with lock_folder(study.folder, "study", "pads"):
         for member, points in ((study, (POINT, OTHER)), (study.repeated[0], (POINT,))):
             for point in points:
                 make(member, point, NAMES)
@@ -108,5 +108,5 @@ def test_a_users_files_in_a_study_stay(study):
 def test_a_study_stays_one_when_its_unused_products_are_removed(study):
     (study.home / "work/reflow-0").mkdir()
     clean(study.folder, "small", unused=True, force=True)
-    with locked(study.folder, "study", "pads"):
+    with lock_folder(study.folder, "study", "pads"):
         assert not any(state.stale for point in (POINT, OTHER) for state in examine(study, point).values())

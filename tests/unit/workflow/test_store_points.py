@@ -2,7 +2,7 @@
 
 import pytest
 
-from reflowshock.workflow.jobs.batch import log_of, missing, show_products, why
+from reflowshock.workflow.jobs.batch import failure_message, list_missing, log_of, show_products
 from reflowshock.workflow.pipeline.points import PointsError, read_possible_points
 from reflowshock.workflow.store.state import examine
 from reflowshock.workflow.store.store import MESSAGE, Store
@@ -50,12 +50,12 @@ def test_a_shared_product_is_missing_once(tmp_path):
     store = Store(tmp_path)
     settings = [{}, {"shock.peak_acceleration": "1000 G"}, {"solder.volume": "0.07 mm^3"}]
     points = read_possible_points(SMALL_CASE, settings)[0]
-    jobs = missing(store, points, "report")
+    jobs = list_missing(store, points, "report")
     count = {stage: sum(job.stage == stage for job in jobs) for stage in points[0].case.pipeline.names}
     assert count == {"geometry": 1, "reflow": 2, "surface": 2, "solder_mesh": 2, "shock": 3, "report": 3}
     make(store, points[0], ["geometry", "reflow"])
-    assert [job.stage for job in missing(store, points[:2], "solder_mesh")] == ["surface", "solder_mesh"]
-    assert missing(store, points[:1], "surface")[0].needs == ()
+    assert [job.stage for job in list_missing(store, points[:2], "solder_mesh")] == ["surface", "solder_mesh"]
+    assert list_missing(store, points[:1], "surface")[0].needs == ()
     assert not store.is_complete(points[0], "surface")
     assert store.is_complete(points[0], "reflow")
 
@@ -72,27 +72,27 @@ def test_a_point_has_a_run_folder_as_any_other(tmp_path):
     assert states["reflow"].missing
 
 
-def test_why_a_point_is_not_complete_is_told(tmp_path):
+def test_the_reason_of_an_incomplete_point_is_reported(tmp_path):
     store, point = Store(tmp_path), read_possible_points(SMALL_CASE, [{}])[0][0]
     make(store, point, ["geometry"])
-    assert why(store, point, "geometry") == ""
-    assert why(store, point, "report") == "stage reflow: was not started"
+    assert failure_message(store, point, "geometry") == ""
+    assert failure_message(store, point, "report") == "stage reflow: was not started"
     log = log_of(store, point, "reflow")
     log.parent.mkdir(parents=True)
     log.write_text("some words\nKilled\n")
     assert (
         f'stage reflow: ended without an error message (it may have been killed); last output: "Killed"; see {log}'
-        == (why(store, point, "report"))
+        == (failure_message(store, point, "report"))
     )
     message = store.work_folder(point, "reflow") / ".reflow.partial" / MESSAGE
     message.parent.mkdir(parents=True)
     message.write_text("it broke")
-    assert why(store, point, "report") == "stage reflow: it broke"
+    assert failure_message(store, point, "report") == "stage reflow: it broke"
     store.prepare_work(point, "reflow")
     assert store.message(point, "reflow") is None
 
 
-def test_all_that_is_wrong_with_points_is_told_with_their_settings():
+def test_all_errors_of_points_are_reported_with_their_settings():
     settings = [{}, {"package.pitch": "0.1 mm"}, {"package.pitsch": "1 mm", "solder.volume": "1 mm"}]
     points, impossible = read_possible_points(SMALL_CASE, settings)
     lines = PointsError("study.toml", impossible, settings).lines()

@@ -5,7 +5,7 @@ import pytest
 from reflowshock.workflow.case.fields import leaves
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.run import Findings
-from reflowshock.workflow.jobs.batch import missing, show_products
+from reflowshock.workflow.jobs.batch import list_missing, show_products
 from reflowshock.workflow.package.case import BOARD_DROP
 from reflowshock.workflow.pipeline.points import read_case_of_run
 from reflowshock.workflow.pipeline.reader import read_case
@@ -104,7 +104,7 @@ def test_a_lost_product_is_made_again_and_what_follows_only_if_it_comes_out_othe
     lost.unlink()
     make(done, point, ["solder_mesh"], content=", otherwise")
     assert stale(done, point) == ("shock", "report")
-    assert [job.stage for job in missing(done, [point], "report")] == ["shock", "report"]
+    assert [job.stage for job in list_missing(done, [point], "report")] == ["shock", "report"]
 
 
 def test_a_geometry_with_the_same_pads_is_not_read_by_the_reflow(done):
@@ -137,7 +137,7 @@ def test_a_check_that_failed_is_named(store):
     assert failed_checks(store, point_of(), "geometry") == []
 
 
-def test_a_damaged_case_of_a_run_is_told(done):
+def test_a_damaged_case_of_a_run_is_reported(done):
     path = done.folder / CASE
     path.write_text(path.read_text().replace('"small"', '"smell"'))
     with pytest.raises(CaseError, match="was changed since it was written"):

@@ -9,11 +9,11 @@ import pytest
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.jobs.batch import show_products
 from reflowshock.workflow.store import view
-from reflowshock.workflow.store.folders import RunFolderBusy, locked, remove_own
+from reflowshock.workflow.store.folders import RunFolderBusy, lock_folder, remove_program_files
 from reflowshock.workflow.store.product import discard
 from reflowshock.workflow.store.state import examine
 from reflowshock.workflow.store.store import Store
-from reflowshock.workflow.store.view import not_as_put, remove_unused, withdraw_all
+from reflowshock.workflow.store.view import altered_files, remove_all_links, remove_unused
 from tests.support.products import OTHER, POINT, make, shown_run
 
 NAMES = POINT.case.pipeline.names
@@ -67,8 +67,8 @@ def test_files_of_a_user_stay(store):
     assert (store.folder / "report.html").read_text() == "report/report.html"
     assert (store.folder / "report.html.kept-1").read_text() == "mine, too"
     show_products(store, OTHER)
-    withdraw_all(store)
-    assert remove_own(store.folder) == ["notes.txt", "report.html.kept-1", "shock"]
+    remove_all_links(store)
+    assert remove_program_files(store.folder) == ["notes.txt", "report.html.kept-1", "shock"]
     assert all(path.read_text() == "mine" for path in mine)
 
 
@@ -92,8 +92,8 @@ def test_copies_behind_a_link_are_a_users(store, tmp_path, clean):
     shutil.rmtree(store.folder / "shock")
     (store.folder / "shock").symlink_to(copy)
     if clean:
-        withdraw_all(store)
-        assert remove_own(store.folder) == ["shock"]
+        remove_all_links(store)
+        assert remove_program_files(store.folder) == ["shock"]
     else:
         assert show_products(store, POINT) == ["shock/stage.json"]
         assert (store.folder / "shock.kept-1").is_symlink() and not (store.folder / "shock").is_symlink()
@@ -109,7 +109,7 @@ def test_a_run_folder_may_be_a_link(store, tmp_path):
     assert link.is_symlink() and (store.folder / "report.html").is_file()
 
 
-def test_what_is_shown_no_more_goes_before_the_list_forgets_it(store, monkeypatch):
+def test_obsolete_links_are_removed_before_their_list_entries(store, monkeypatch):
     """However early the program is killed, no old product is mistaken for a user's file."""
 
     def kill(*_: object) -> None:
@@ -125,7 +125,7 @@ def test_what_is_shown_no_more_goes_before_the_list_forgets_it(store, monkeypatc
     assert not list(store.folder.rglob("*.kept-*"))
 
 
-def test_what_is_of_no_product_does_not_replace_a_users(store):
+def test_foreign_files_do_not_replace_files_of_a_user(store):
     def adopted(text: str, *names: str) -> None:
         made = store.home / "work/made"
         made.mkdir(parents=True)
@@ -163,7 +163,7 @@ def test_a_users_inputs_are_set_aside_or_left(store, tmp_path):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine/case.json").write_text("mine")
     (store.folder / "inputs").symlink_to(tmp_path / "mine")
-    withdraw_all(store)
+    remove_all_links(store)
     assert (tmp_path / "mine/case.json").read_text() == "mine"
     show_products(store, POINT)
     assert (store.folder / "inputs.kept-1").is_symlink() and (store.folder / "inputs/case.json").is_file()
@@ -195,13 +195,13 @@ def test_whatever_stands_where_a_product_is_made_gives_way(store, tmp_path, plac
 def test_a_file_where_a_folder_of_the_store_belongs_gives_way(store, name):
     discard(store.folder / name)
     (store.folder / name).write_text("?")
-    with locked(store.folder, "run", "small"):
+    with lock_folder(store.folder, "run", "small"):
         for stage in NAMES:
             if not store.has(POINT, stage):
                 make(store, POINT, [stage])
         show_products(store, POINT)
     assert not any(state.stale for state in examine(store, POINT).values())
-    assert not_as_put(store, store.folder) == []
+    assert altered_files(store, store.folder) == []
 
 
 def test_a_folder_where_the_list_belongs_gives_way(store):
@@ -241,11 +241,11 @@ def test_a_copy_of_a_run_folder_is_one(store, tmp_path):
 
 @pytest.mark.parametrize(("what", "name"), [("run", "other"), ("study", "small")])
 def test_another_case_needs_force(store, what, name):
-    with pytest.raises(CaseError, match=r"contains the run of small.*--force"), locked(store.folder, what, name):
+    with pytest.raises(CaseError, match=r"contains the run of small.*--force"), lock_folder(store.folder, what, name):
         pass
-    with locked(store.folder, what, name, force=True):
+    with lock_folder(store.folder, what, name, force=True):
         pass
-    with locked(store.folder, what, name):
+    with lock_folder(store.folder, what, name):
         pass
 
 
@@ -256,48 +256,48 @@ def test_a_folder_of_somebody_else_is_left_alone(tmp_path, names, words):
     for name in names:
         (tmp_path / name).mkdir()
     for force in (False, True):
-        with pytest.raises(CaseError, match=words), locked(tmp_path, "run", "small", force):
+        with pytest.raises(CaseError, match=words), lock_folder(tmp_path, "run", "small", force):
             pass
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names)
 
 
 def test_no_run_folder_is_made_in_a_store(store):
     folder = store.home / "products/mine"
-    with pytest.raises(CaseError, match=r"is inside \.store"), locked(folder, "run", "small"):
+    with pytest.raises(CaseError, match=r"is inside \.store"), lock_folder(folder, "run", "small"):
         pass
     assert not folder.exists()
 
 
-def test_a_mark_that_was_being_written_is_no_users(tmp_path):
+def test_an_unfinished_mark_is_not_a_file_of_a_user(tmp_path):
     (tmp_path / ".reflowshock.partial").write_text("{")
-    with locked(tmp_path, "run", "small"):
+    with lock_folder(tmp_path, "run", "small"):
         pass
-    assert remove_own(tmp_path) == []
+    assert remove_program_files(tmp_path) == []
 
 
-def test_what_the_run_folder_lacks_is_told(store):
-    assert not_as_put(store, store.folder) == []
+def test_missing_files_of_the_run_folder_are_reported(store):
+    assert altered_files(store, store.folder) == []
     (store.folder / "report.html").unlink()
     (store.folder / "summary.json").unlink()
     (store.folder / "summary.json").write_text("mine")
-    differences = not_as_put(store, store.folder)
+    differences = altered_files(store, store.folder)
     assert sorted(line.removeprefix(f"{store.folder}/") for line in differences) == [
         "report.html is missing",
         "summary.json was modified",
     ]
     show_products(store, POINT)
-    assert not_as_put(store, store.folder) == []
+    assert altered_files(store, store.folder) == []
 
 
 def test_a_run_folder_has_one_user(tmp_path):
-    first, second = locked(tmp_path, "run", "a"), locked(tmp_path, "run", "a")
+    first, second = lock_folder(tmp_path, "run", "a"), lock_folder(tmp_path, "run", "a")
     with first, pytest.raises(RunFolderBusy, match="another run is active"), second:
         pass
-    with locked(tmp_path, "run", "a"):
+    with lock_folder(tmp_path, "run", "a"):
         pass
 
 
-def test_a_lock_that_was_removed_meanwhile_is_none(tmp_path, monkeypatch):
+def test_a_removed_lock_does_not_lock(tmp_path, monkeypatch):
     """As when a folder is cleaned between the opening of its lock and the holding of it."""
     folder, take = tmp_path / "run", fcntl.flock
 
@@ -306,12 +306,12 @@ def test_a_lock_that_was_removed_meanwhile_is_none(tmp_path, monkeypatch):
         take(descriptor, how)
 
     monkeypatch.setattr(fcntl, "flock", clean_first)
-    with pytest.raises(RunFolderBusy, match="try again"), locked(folder, "run", "a"):
+    with pytest.raises(RunFolderBusy, match="try again"), lock_folder(folder, "run", "a"):
         pass
 
 
 @pytest.mark.parametrize("make_it", [lambda path: path.touch(), lambda path: path.symlink_to(path)])
-def test_what_is_no_folder_is_refused(tmp_path, make_it):
+def test_paths_that_are_not_folders_are_rejected(tmp_path, make_it):
     make_it(tmp_path / "file")
-    with pytest.raises(CaseError, match=r"is not a folder|cannot be used"), locked(tmp_path / "file", "run", "a"):
+    with pytest.raises(CaseError, match=r"is not a folder|cannot be used"), lock_folder(tmp_path / "file", "run", "a"):
         pass

@@ -114,11 +114,11 @@ def test_an_expected_error_is_no_miss_and_its_absence_is():
         ({"vary": {"length": "3 mm"}}, "must be a list"),
     ],
 )
-def test_what_is_wrong_in_a_file_is_told(changes, message):
+def test_errors_in_a_file_are_reported(changes, message):
     assert message in refused(**changes)
 
 
-def test_a_run_that_cannot_be_is_told_before_it_is_tried(tmp_path):
+def test_an_impossible_run_is_reported_before_it_starts(tmp_path):
     drop = {"case": str(HARD.parent / "sessile_drop/case.toml"), "settings": {"drop": {"volum": "1 mm^3"}}}
     run = {"family": "reflow", "title": "a run", "why": "", "trial": "run", "bounds": {"shape_error": "1 %"}}
     for parameters, message in (({"case": "no.toml"}, "does not exist"), (drop, "did you mean drop.volume?")):
@@ -145,6 +145,7 @@ def rods(monkeypatch, tmp_path):
     return attempt_rods
 
 
+@pytest.mark.long
 def test_hangs_and_deaths_are_misses_and_the_rest_goes_on(rods):
     survived, report = rods(vary={"fate": ["hangs", "dies", "holds"]}, deadline="4 s")
     assert not survived
@@ -162,7 +163,7 @@ def test_ctrl_c_ends_a_stress_test_with_a_word(tmp_path):
         "reflowshock",
         "stress-test",
         "--family",
-        "coupling",
+        "remesh",
         "--out",
         str(tmp_path),
         "-j",
@@ -177,7 +178,7 @@ def test_ctrl_c_ends_a_stress_test_with_a_word(tmp_path):
     assert "interrupted" in output
 
 
-def test_results_that_cannot_be_written_are_told_before_anything_is_tried(tmp_path):
+def test_unwritable_results_are_reported_before_anything_runs(tmp_path):
     case = tmp_path / "elements_rod.toml"
     case.write_text(hard_case_text(TABLE))
     with pytest.raises(CaseError, match="--out"):
@@ -227,6 +228,6 @@ def test_all_cases_of_the_program_can_be_read():
 
 
 @given(quantities(-30.0, 30.0, "deg"))
-def test_what_is_drawn_is_zero_or_can_be_told_from_it(quantity):
+def test_drawn_values_are_zero_or_distinguishable_from_it(quantity):
     value = float(quantity.removesuffix(" deg"))
     assert value == 0.0 or abs(value) > 1e-5

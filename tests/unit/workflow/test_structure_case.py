@@ -48,7 +48,7 @@ BAD_VALUES = {
     "force without place": ("loads.poke={kind='point_force',peak='1 N'}", ["loads.poke.at: is missing"]),
     "force outside": (f"loads.poke={{{POKE},peak='1 N',duration='1 ms'}}", ["loads.poke.at", "outside the meshed"]),
     "support that holds nothing": ("supports.edge.on=x_min", ["supports.edge.hold", "any of x, y, z, or a bedding"]),
-    "springs of what is held": (
+    "springs on a fixed face": (
         "supports.holes.bedding.x=1e12 N/m^3",
         ["supports.holes.bedding.x", "is held by supports.holes.hold"],
     ),
@@ -110,7 +110,7 @@ def test_a_step_above_the_critical_one_is_refused_where_it_is_known():
         read_case(case, [setting, other])
 
 
-def test_report_says_what_part_is_meshed():
+def test_the_report_names_the_meshed_part():
     wholes = {"[]": "", '["y"]': "half", '["x", "y"]': "quarter", '["y", "y"]': "half"}
     for symmetry, part in wholes.items():
         assert meshed_part(read_case(BOARD, [f"structure.symmetry={symmetry}"])) == part

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.jobs.batch import Machine, missing
+from reflowshock.workflow.jobs.batch import Machine, list_missing
 from reflowshock.workflow.kinds import stage_seconds
 from reflowshock.workflow.pipeline.points import PointsError
 from reflowshock.workflow.store.store import Store
 from reflowshock.workflow.study import tables
 from reflowshock.workflow.study.command import has_metrics, read_points_of, results, run_study
 from reflowshock.workflow.study.designs import Factor, Hypercube, as_text, between
-from reflowshock.workflow.study.main_effects import effect_of, ranked
+from reflowshock.workflow.study.main_effects import effect_of, rank_parameters
 from reflowshock.workflow.study.process_map import outcomes, process_map
 from reflowshock.workflow.study.progress import forecast_stages, seconds_left
 from reflowshock.workflow.study.results import HEALTHY, IMPOSSIBLE, UNHEALTHY, Row, columns, write_csv, write_parquet
@@ -135,7 +135,7 @@ def test_date_is_rejected_as_a_value(write):
 
 def test_shared_products_are_predicted_once(write, tmp_path):
     points = list(read_points_of(write(GRID)).possible.values())
-    jobs = missing(Store(tmp_path / "store"), points, "report")
+    jobs = list_missing(Store(tmp_path / "store"), points, "report")
     stages = {forecast.stage: forecast for forecast in forecast_stages(points, jobs)}
     assert (stages["geometry"].products, stages["reflow"].products, stages["geometry"].points) == (2, 4, 4)
     expected = sum(stage_seconds(point.case)["reflow"] for point in points)
@@ -173,8 +173,8 @@ def test_main_effects_are_differences_of_means():
 
 def test_only_healthy_points_are_ranked():
     rows = [*ROWS, row(5, 1.0, 0.07, 0.5, UNHEALTHY), row(6, 1.0, 0.07, None)]
-    assert [point.number for point in ranked(rows, "stress", "minimise")] == [1, 3, 2, 4]
-    assert [point.number for point in ranked(rows, "stress", "maximise")] == [4, 2, 3, 1]
+    assert [point.number for point in rank_parameters(rows, "stress", "minimise")] == [1, 3, 2, 4]
+    assert [point.number for point in rank_parameters(rows, "stress", "maximise")] == [4, 2, 3, 1]
 
 
 def test_csv_and_parquet_have_the_same_columns_with_units(write, tmp_path):
@@ -248,7 +248,7 @@ def test_process_map_over_one_factor_is_a_line_and_over_names_missing(write):
 
 def test_missing_metric_is_reported(write, tmp_path, monkeypatch, capsys):
     points = read_points_of(write('[grid]\n"package.pitch" = ["1 mm"]\n', HEAD.replace("stress", "stres")))
-    monkeypatch.setattr("reflowshock.workflow.study.command.missing", lambda *_: [])
+    monkeypatch.setattr("reflowshock.workflow.study.command.list_missing", lambda *_: [])
     monkeypatch.setattr("reflowshock.workflow.study.command.row_of", lambda *_: ROWS[0])
     monkeypatch.setattr("reflowshock.workflow.study.page.write_results", lambda *_: None)
     assert not run_study(points, Store(tmp_path / "store"), Machine(1))

@@ -10,7 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from reflowshock.workflow.process import terminal
-from reflowshock.workflow.process.terminal import Terminal, new_table, progress_bar, styled, visible
+from reflowshock.workflow.process.terminal import Terminal, new_table, progress_bar, style_text, visible
 
 NASTY = "a[/x] [ ] [bold]b :smile: \x1b[31m\x07\x9b2J\r\u202e"
 SHOWN = r"a[/x] [ ] [bold]b :smile: \x1b[31m\x07\x9b2J\r\u202e"
@@ -38,7 +38,7 @@ def table_of(text: str) -> Table:
     return table
 
 
-@pytest.mark.parametrize("what", [NASTY, styled("{}", NASTY), table_of(NASTY)], ids=["text", "styled", "table"])
+@pytest.mark.parametrize("what", [NASTY, style_text("{}", NASTY), table_of(NASTY)], ids=["text", "styled", "table"])
 def test_text_is_shown_as_it_is(console_output, what):
     console, written = console_output
     console.print(what)
@@ -61,14 +61,14 @@ def test_surrogates_can_be_written():
 
 
 def test_own_words_have_a_style_and_values_take_it():
-    styled_text = styled("[bold]{}[/] of {}", "[red]x", "{}")
+    styled_text = style_text("[bold]{}[/] of {}", "[red]x", "{}")
     assert styled_text.plain == "[red]x of {}"
     assert [(span.start, span.end, str(span.style)) for span in styled_text.spans] == [(0, 6, "bold")]
 
 
 def test_a_value_for_each_place():
     with pytest.raises(ValueError):
-        styled("{} {}", 1)
+        style_text("{} {}", 1)
 
 
 def test_descriptions_of_progress_are_text(console_output, monkeypatch):
@@ -87,7 +87,7 @@ def test_errors_are_text(monkeypatch, capsys):
 def test_a_pipe_gets_no_sequences_even_if_colours_are_forced(monkeypatch):
     monkeypatch.setenv("FORCE_COLOR", "1")
     console = Terminal(file=io.StringIO(), force_terminal=False)
-    console.print(styled("[bold red]x"))
+    console.print(style_text("[bold red]x"))
     assert console.file.getvalue() == "x\n"
 
 

@@ -47,7 +47,7 @@ def test_the_section_has_scheme_joints_and_checks():
     assert rows["mass of the macro model"] == "1000 mg"
 
 
-def test_a_structure_tells_its_fine_layers_and_its_direction():
+def test_a_structure_reports_its_fine_layers_and_its_direction():
     rows = rows_of(section.two_scales({"fine_layers": ["solder", "copper"], "direction": "two_way"}, MODEL))
     assert rows["fine layers"] == "solder copper"
     assert rows["direction"] == "two-way"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from reflowshock.fem.problem.failure import Failure
-from reflowshock.parameters import changed
+from reflowshock.parameters import with_value
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.verdict.answer import answer, criteria_table, failing
@@ -32,7 +32,7 @@ OFF = {"board_deflection": {"apply": "off"}}
 
 
 def dropped(failure, history=HISTORY, metrics=None, reference=None, coarse=()):
-    case = changed(CASE, "shock.failure", Failure.model_validate(failure))
+    case = with_value(CASE, "shock.failure", Failure.model_validate(failure))
     return JudgedDrop(case, metrics or {}, history, coarse, reference)
 
 
@@ -103,7 +103,7 @@ def test_values_of_coarse_joints_are_marked():
     assert [joint.get("mesh") for joint in judged(coarse=["A2"])["joints"].values()] == [None, "coarse"]
 
 
-def test_life_is_that_of_the_joint_that_fails_first_with_its_scatter():
+def test_life_belongs_to_the_joint_that_fails_first_with_its_scatter():
     verdict = judged(life=LIFE)
     assert verdict["life"] == LIFE_OF_A2
     assert "NO LIMIT; life of A2 10 drops (5 to 20); discretisation" in answer(verdict, None)

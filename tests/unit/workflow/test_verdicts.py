@@ -84,7 +84,7 @@ def test_widths_are_judged_to_one_per_cent_and_counted(records):
     assert result.metrics["joints_compared_in_width"]["value"] == 2 and result.health["joint_width_error_max"]["ok"]
 
 
-def test_a_joint_that_failed_says_how():
+def test_a_failed_joint_names_its_error():
     assert judge_joint({}, "overflow", {}).health["joint_overflow"] == {
         "value": 1,
         "limit": 0,
