@@ -34,7 +34,12 @@ class PlannedStage:
 
 
 def planned_stages(store: Store, point: Point) -> dict[str, PlannedStage]:
-    """Return the planned action of each stage, in order."""
+    """Return the planned action of each stage, by name in order: whether it runs, why, and its predicted time [s].
+
+    Args:
+        store: Store of the run folder, whose files are examined.
+        point: Point of the run.
+    """
     costs = predicted_costs(store, point.case, stage_seconds(point.case))
     return {
         name: PlannedStage(state.stale, reason(state, point.case), costs[name].seconds)
@@ -43,7 +48,16 @@ def planned_stages(store: Store, point: Point) -> dict[str, PlannedStage]:
 
 
 def plan_record(store: Store, point: Point) -> dict[str, Any]:
-    """Return a plan as JSON data: stages, effects as in ``summary.json``, wall times of compilation and total [s]."""
+    """Return a plan as JSON data: stages, effects as in ``summary.json``, wall times of compilation and total [s].
+
+    Args:
+        store: Store of the run folder, whose files are examined.
+        point: Point of the run.
+
+    Returns:
+        ``case`` (name), ``folder``, ``stages`` (``runs``, ``why``, ``seconds`` by name), ``effects``, ``compilation``
+        [s] and ``seconds`` of all.
+    """
     stages = planned_stages(store, point)
     once = compilation_time([name for name, stage in stages.items() if stage.runs])
     return {
@@ -69,7 +83,12 @@ def show_plan(store: Store, point: Point, console: Console) -> None:
 
 
 def change_text(change: Change, case: Case) -> str:
-    """Return old and new value of a changed parameter as text in the user's unit."""
+    """Return a changed parameter as text in the user's unit: "key: old -> new".
+
+    Args:
+        change: Key, old and new SI value.
+        case: Case, whose fields give the units.
+    """
     fields = {key: field for key, _, field in leaves(case)}
 
     def text(value: object) -> str:
@@ -83,7 +102,12 @@ def change_text(change: Change, case: Case) -> str:
 
 
 def reason(state: StageState, case: Case) -> str:
-    """Return the reason why a stage will run or not."""
+    """Return the reason why a stage will run or not, one line per changed parameter.
+
+    Args:
+        state: State of the stage's product.
+        case: Case of the run, whose fields give the units.
+    """
     if not state.stale:
         redone = ", ".join(state.because_of)
         return f"up to date if {redone} gives the same result" if redone else "up to date"
@@ -100,7 +124,13 @@ def reason(state: StageState, case: Case) -> str:
 
 
 def predicted_seconds(store: Store, point: Point, until: str) -> float:
-    """Predict the wall time of all missing products up to a stage [s]."""
+    """Predict the wall time of all missing products up to a stage [s].
+
+    Args:
+        store: Store of the run folder, whose files are examined.
+        point: Point of the run.
+        until: Last stage to run.
+    """
     states, costs = examine(store, point), predicted_costs(store, point.case, stage_seconds(point.case))
     stale = [stage.name for stage in point.case.pipeline.upstream(until) if states[stage.name].stale]
     return sum(costs[name].seconds for name in stale) + compilation_time(stale)
@@ -118,7 +148,16 @@ class PredictedCost:
 
 
 def predicted_costs(store: Store, case: Case, seconds: Mapping[str, float]) -> dict[str, PredictedCost]:
-    """Correct predicted wall times [s] of stages by a convergence study of the case, otherwise by former runs."""
+    """Correct the predicted wall times of stages by a convergence study of the case, otherwise by earlier runs.
+
+    Args:
+        store: Store with the records of earlier runs.
+        case: Case of the run.
+        seconds: Stage -> predicted wall time [s].
+
+    Returns:
+        Stage -> corrected wall time [s], and a text on the source of the correction, empty without one.
+    """
     from reflowshock.workflow.convergence.calibration import Calibration, calibration_from_store, calibration_from_study
 
     study, former = calibration_from_study(case) or Calibration({}, 0), calibration_from_store(store, seconds)

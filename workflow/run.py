@@ -44,7 +44,7 @@ def run_case(store: Store, point: Point, until: str, machine: Machine, *, force:
         force: Whether the folder may contain another case.
 
     Returns:
-        The result; the verdict is empty without a report or without limits in the case.
+        Whether the run is complete and healthy, and the verdict, empty without a report or without limits in the case.
 
     Raises:
         CaseError: The folder belongs to something else, is not writable, or contains an input of the case.

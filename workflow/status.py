@@ -42,7 +42,13 @@ FIGURES = {
 
 
 def follow_run(store: Store, point: Point, console: Console) -> None:
-    """Show the progress and the remaining time of the running stages until the run ends."""
+    """Show the progress and the remaining time of the running stages until the run ends.
+
+    Args:
+        store: Store of the run folder, in which another process runs.
+        point: Point of the run.
+        console: Console to print to.
+    """
     if not is_busy(store.folder):
         console.print(f"no run is active in {store.folder}")
         return
@@ -68,7 +74,7 @@ def _progress(store: Store, point: Point, stage: str) -> str:
 
 
 def show_status(store: Store, point: Point, console: Console) -> None:
-    """Print state, wall time and main figures of each stage."""
+    """Print state, wall time and main figures of each stage of a run; nothing is changed."""
     table = Table(title=f"{point.case.case.name} in {store.folder}", title_justify="left", expand=True)
     table.add_column("stage", no_wrap=True)
     table.add_column("state", no_wrap=True)
@@ -83,7 +89,11 @@ def show_status(store: Store, point: Point, console: Console) -> None:
 
 
 def metric_text(metric: dict) -> str:
-    """Format a metric in a customary unit."""
+    """Format a metric in a customary unit.
+
+    Args:
+        metric: Record with ``value`` (SI) and ``unit``.
+    """
     value, unit = metric["value"], metric["unit"]
     if isinstance(value, str | bool | int) or value is None:
         return f"{value} {unit}".strip()

@@ -123,7 +123,7 @@ def plan_ranks(
     """
     family = {role: families(load.mesh, load.kind) for role, load in loads.items() if load.mesh}
     present = np.unique(np.concatenate([np.zeros(0, np.int8), *family.values()]))
-    measured = stored_costs(world, folder, present) or measure(world, loads, family)
+    measured = stored_costs(world, folder, present) or _measure(world, loads, family)
     if folder is not None and world.rank == 0:
         store_costs(folder, measured)
     overlap = scheme not in ALTERNATING
@@ -134,7 +134,7 @@ def plan_ranks(
     return plan or Plan(shared[0], {}, shared[1])
 
 
-def measure(world: MPI.Comm, loads: Mapping[Role, ModelWork], family: Mapping[Role, NDArray[np.int8]]) -> Measured:
+def _measure(world: MPI.Comm, loads: Mapping[Role, ModelWork], family: Mapping[Role, NDArray[np.int8]]) -> Measured:
     """Measure the cost of each element family on a sample from the model with most of its elements; collective."""
     chosen: dict[int, tuple[MeshData, MeshData, Kind]] = {}
     for role in sorted(family, key=lambda role: len(family[role])):
@@ -151,13 +151,13 @@ def stored_costs(world: MPI.Comm, folder: Path | None, present: NDArray[np.int8]
     costs = None
     if world.rank == 0 and folder is not None and (folder / COST_FILE).exists():
         try:
-            costs = read(folder / COST_FILE, world.size, present)
+            costs = _read(folder / COST_FILE, world.size, present)
         except (OSError, ValueError, KeyError, TypeError, IndexError) as error:
             warn(f"{folder / COST_FILE} is damaged, costs are measured again: {type(error).__name__}: {error}")
     return world.bcast(costs)
 
 
-def read(path: Path, ranks: int, present: NDArray[np.int8]) -> Measured | None:
+def _read(path: Path, ranks: int, present: NDArray[np.int8]) -> Measured | None:
     """Read measured costs; return None for another number of ranks or a missing element family."""
     record = json.loads(path.read_text())
     cost = StepCost(np.array(record["fixed"], float), np.array(record["element"], float))
@@ -189,7 +189,7 @@ def plan_from(
         overlap: Whether both models work concurrently.
     """
     cost, size = measured.cost, len(measured.cost.fixed)
-    seconds = {role: rank_seconds(load, family[role], cost) for role, load in loads.items()}
+    seconds = {role: _rank_seconds(load, family[role], cost) for role, load in loads.items()}
     speeds = speeds_of(np.sum([work for work, _ in seconds.values()], axis=0))
     models = {
         role: ModelCost(float((work * speeds).mean()), float(fixed.mean()), int(loads[role].rates[used].sum()))
@@ -205,14 +205,14 @@ def plan_from(
         placements = [Alternative(alone, model_seconds(model, speeds.sum(), size > 1, measured.latency))]
     chosen = placements[0]
     cells = {
-        role: partition(load.mesh, level_work(load, family[role], cost), speeds[list(chosen.placement.ranks[role])])
+        role: partition(load.mesh, _level_work(load, family[role], cost), speeds[list(chosen.placement.ranks[role])])
         for role, load in loads.items()
         if load.mesh is not None and len(chosen.placement.ranks[role]) > 1
     }
     return Plan(chosen.placement, cells, summary(ranks, placements, speeds, measured))
 
 
-def rank_seconds(
+def _rank_seconds(
     load: ModelWork, family: NDArray[np.int8], cost: StepCost
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the time per window of all elements of a model, and of its calls, each of shape (ranks,) [s]."""
@@ -223,7 +223,7 @@ def rank_seconds(
     return cost.element @ updates, cost.fixed @ calls + CALLS * load.steps
 
 
-def level_work(load: ModelWork, family: NDArray[np.int8], cost: StepCost) -> NDArray[np.float64]:
+def _level_work(load: ModelWork, family: NDArray[np.int8], cost: StepCost) -> NDArray[np.float64]:
     """Return the time per window of each element in the column of its level, shape (ne, levels) [s]."""
     work = np.zeros((len(family), len(load.rates)))
     work[np.arange(len(family)), load.level] = cost.element.mean(axis=0)[family] * load.rates[load.level]

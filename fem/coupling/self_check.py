@@ -74,18 +74,18 @@ def self_check(world: MPI.Comm, bodies: Mapping[Role, Body], channels: Interface
     """Check fields, forces and masses through ties and interface of two models; collective over ``world``."""
     size = max(float(np.ptp(body.local.points, axis=0).max()) for body in bodies.values())
     size = world.allreduce(size, MPI.MAX)
-    rigid, linear = (field_error(bodies, channels, gradient, size) for gradient in (RIGID, LINEAR))
-    tie, interface = load_errors(world, bodies, channels, size)
+    rigid, linear = (_field_error(bodies, channels, gradient, size) for gradient in (RIGID, LINEAR))
+    tie, interface = _load_errors(world, bodies, channels, size)
     return SelfCheck(
         world.allreduce(rigid, MPI.MAX),
         world.allreduce(linear, MPI.MAX),
         tie,
         interface,
-        *world.allreduce(masses(bodies)),
+        *world.allreduce(_masses(bodies)),
     )
 
 
-def field_error(
+def _field_error(
     bodies: Mapping[Role, Body], channels: InterfaceChannels, gradient: NDArray[np.float64], size: float
 ) -> float:
     """Return the largest relative error of a linear field on this rank, at slaves and received interface values."""
@@ -107,7 +107,7 @@ def field_error(
     return error
 
 
-def load_errors(
+def _load_errors(
     world: MPI.Comm, bodies: Mapping[Role, Body], channels: InterfaceChannels, size: float
 ) -> tuple[float, float]:
     """Return the relative net load lost by the ties and at the interface; collective."""
@@ -139,7 +139,7 @@ def load_errors(
     return float(tie), float(interface)
 
 
-def masses(bodies: Mapping[Role, Body]) -> NDArray[np.float64]:
+def _masses(bodies: Mapping[Role, Body]) -> NDArray[np.float64]:
     """Return this rank's masses of macro model, interface, rest of the meso model, and volumes, shape (4,) [kg]."""
     result = np.zeros(4)
     for role, body in bodies.items():

@@ -73,11 +73,11 @@ def samples(mesh: MeshData, family: NDArray[np.int8], ranks: int) -> dict[int, t
     for number in np.unique(family).tolist():
         chosen = np.flatnonzero(family == number)
         share = min(LARGE, -(-len(chosen) // ranks))
-        sampled[number] = some_cells(mesh, chosen, min(SMALL, share)), some_cells(mesh, chosen, share)
+        sampled[number] = _some_cells(mesh, chosen, min(SMALL, share)), _some_cells(mesh, chosen, share)
     return sampled
 
 
-def some_cells(mesh: MeshData, chosen: NDArray[np.int64], count: int) -> MeshData:
+def _some_cells(mesh: MeshData, chosen: NDArray[np.int64], count: int) -> MeshData:
     """Return the middle ``count`` of the chosen cells as a mesh without facets."""
     begin = (len(chosen) - count) // 2
     taken = chosen[begin : begin + count]

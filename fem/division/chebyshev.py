@@ -40,7 +40,7 @@ class Substeps:
     def of(cls, count: int, level: int, damping: float = 0.0) -> "Substeps":
         """Return the coefficients of ``count`` substeps of a level; other arguments as in ``stabilisation``."""
         delta = 1.0 + stabilisation(level, damping) / count**2
-        value, slope = chebyshev(count, delta)
+        value, slope = _chebyshev(count, delta)
         omega = 2.0 * slope[count] / value[count]
         rate = np.concatenate([[1.0 / delta], 2.0 * value[1:count] / value[2:]]) / omega
         memory = np.concatenate([[0.0], value[: count - 1] / value[2:]])
@@ -65,6 +65,9 @@ def stabilisation(level: int, damping: float = 0.0) -> float:
         level: Number of the level, 1 for the outermost.
         damping: Coefficient beta over the step DT of the model, at most ``LARGEST_DAMPING``.
 
+    Returns:
+        Dimensionless nu of the Chebyshev polynomials of this level, see ``Substeps``.
+
     Raises:
         LevelError: The damping is too strong.
     """
@@ -77,7 +80,7 @@ def stabilisation(level: int, damping: float = 0.0) -> float:
     return float(0.5 * np.arccosh(2.0 / (largest - 2.0)) ** 2) * GROWTH ** (level - 1)
 
 
-def chebyshev(degree: int, x: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _chebyshev(degree: int, x: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the Chebyshev polynomials T_k(x) and T_k'(x) for k = 0 ... degree, each of shape (degree + 1,)."""
     value, slope = np.ones(degree + 1), np.zeros(degree + 1)
     value[1], slope[1] = x, 1.0

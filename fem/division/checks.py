@@ -17,22 +17,28 @@ ROUNDING = 1e-9
 
 
 def check_division(whole: Whole, survey: Survey, division: Division, rules: Rules) -> None:
-    """Check models and steps of a division.
+    """Check that the models of a division are not empty and that all its steps are stable.
+
+    Args:
+        whole: Joined mesh with its ties.
+        survey: Critical steps, masses and roles of the cells of this mesh.
+        division: Cells of each model, step levels and window to check.
+        rules: Settings from which the division was made.
 
     Raises:
         CouplingError: A model is empty, a step is unstable, or the buffer is too thin or not part of the board.
     """
     for role, cells in (("macro", division.macro), ("meso", division.meso)):
         if not cells.any():
-            raise CouplingError(empty_model_message(role, whole, rules))
+            raise CouplingError(_empty_model_message(role, whole, rules))
     if division.scheme in BUFFERED and not division.overlaps:
-        check_buffer(whole, survey, division, rules)
+        _check_buffer(whole, survey, division, rules)
     if division.scheme == "local_steps":
-        check_linear(survey, division, rules)
-    check_steps(whole, survey, division, rules)
+        _check_linear(survey, division, rules)
+    _check_steps(whole, survey, division, rules)
 
 
-def empty_model_message(role: str, whole: Whole, rules: Rules) -> str:
+def _empty_model_message(role: str, whole: Whole, rules: Rules) -> str:
     """Return why a model has no cell, and possible remedies, as text."""
     if role == "meso":
         return (
@@ -46,7 +52,7 @@ def empty_model_message(role: str, whole: Whole, rules: Rules) -> str:
     )
 
 
-def check_buffer(whole: Whole, survey: Survey, division: Division, rules: Rules) -> None:
+def _check_buffer(whole: Whole, survey: Survey, division: Division, rules: Rules) -> None:
     """Check that layers of board separate the interface from finer cells; raises as ``check_division``.
 
     A joint on an element that touches the interface makes the window unstable (tests/stability/test_fem_window.py), and
@@ -59,19 +65,19 @@ def check_buffer(whole: Whole, survey: Survey, division: Division, rules: Rules)
         roles = ", ".join(np.unique(survey.role[foreign]).tolist())
         raise CouplingError(
             f"elements that touch the interface must belong to the board, found {np.sum(foreign)} of {roles}, the first"
-            f" {location_of(whole, foreign)}; try coupling.scheme = local_steps, which allows this interface"
+            f" {_location_of(whole, foreign)}; try coupling.scheme = local_steps, which allows this interface"
         )
     layers = rules.coupling.buffer_layers
     close = division.macro & grow_region(cells, seeds_of(whole, ~rules.coarse), rules.coarse, layers)
     if close.any():
         raise CouplingError(
             f"{np.sum(close)} elements of the macro model are too close to the joints, the first"
-            f" {location_of(whole, close)}: at least two layers of board elements must lie between"
+            f" {_location_of(whole, close)}: at least two layers of board elements must lie between"
             f" (coupling.buffer_layers = {layers})"
         )
 
 
-def check_linear(survey: Survey, division: Division, rules: Rules) -> None:
+def _check_linear(survey: Survey, division: Division, rules: Rules) -> None:
     """Check that elements with local steps are linear and lightly damped; raises as ``check_division``."""
     unsupported = division.meso & ~survey.linear
     if unsupported.any():
@@ -88,7 +94,7 @@ def check_linear(survey: Survey, division: Division, rules: Rules) -> None:
         )
 
 
-def check_steps(whole: Whole, survey: Survey, division: Division, rules: Rules) -> None:
+def _check_steps(whole: Whole, survey: Survey, division: Division, rules: Rules) -> None:
     """Check every step against the critical steps of its elements; raises as ``check_division``."""
     for name, step, cells, critical in steps_of(whole, survey, division, rules):
         above = cells & (step > (1.0 + ROUNDING) * rules.fraction * critical)
@@ -97,14 +103,19 @@ def check_steps(whole: Whole, survey: Survey, division: Division, rules: Rules) 
             raise CouplingError(
                 f"{name} of {step:.4g} s is above step_fraction = {rules.fraction:g} of the critical step of"
                 f" {np.sum(above)} elements ({', '.join(np.unique(survey.role[above]).tolist())}), the first"
-                f" {location_of(whole, above)}: at most {rules.fraction * lowest:.4g} s is stable"
+                f" {_location_of(whole, above)}: at most {rules.fraction * lowest:.4g} s is stable"
             )
 
 
 def steps_of(
     whole: Whole, survey: Survey, division: Division, rules: Rules
 ) -> Iterator[tuple[str, float, NDArray[np.bool_], NDArray[np.float64]]]:
-    """Yield for each step its name, its size [s], the cells that limit it (ne,), and their step limits (ne,) [s]."""
+    """Yield all time steps of a division, each with the cells that limit it.
+
+    Yields:
+        Name of the step for messages, its size [s], mask of the cells that take it, shape (ne,), and the largest stable
+        step of every cell, shape (ne,) [s], of which only the masked ones count.
+    """
     cells, plan = whole.mesh.cells, division.plan
     if division.scheme == "local_steps":
         limits = StepLimits(survey.step, survey.cost, plan.window, rules.fraction, rules.stiffness)
@@ -127,7 +138,7 @@ def check_pulses(durations: Iterable[float], window: float, fraction: float) -> 
     Args:
         durations: Durations of the pulses [s].
         window: Coupling window [s].
-        fraction: Window over critical step, for the message.
+        fraction: Window over critical step (``numerics.step_fraction``), for the message.
 
     Raises:
         PulseError: A pulse is shorter than a window.
@@ -140,7 +151,7 @@ def check_pulses(durations: Iterable[float], window: float, fraction: float) -> 
         )
 
 
-def location_of(whole: Whole, cells: NDArray[np.bool_]) -> str:
+def _location_of(whole: Whole, cells: NDArray[np.bool_]) -> str:
     """Return the centre of the first selected cell as text."""
     centre = whole.mesh.points[whole.mesh.cells[np.argmax(cells)]].mean(axis=0)
     return f"near ({', '.join(f'{value:.6g}' for value in centre)}) m"

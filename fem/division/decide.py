@@ -113,7 +113,14 @@ def in_local_steps(
 
 
 def in_path_levels(division: Division, rules: Rules, limits: StepLimits, around: Around) -> Division:
-    """Return a division of held velocity with step levels in its meso model; arguments as ``with_path_levels``."""
+    """Return a division of held velocity with step levels in its meso model; other arguments as ``with_path_levels``.
+
+    Args:
+        division: Division with a single level in the meso model.
+        rules: Settings; their coupling limits the number of levels.
+        limits: Critical steps and costs of all cells.
+        around: Function that returns the meso cells sharing a node with given cells, shape (ne,).
+    """
     return with_path_levels(division, limits, around, rules.coupling.most_levels)
 
 
@@ -146,7 +153,7 @@ def divide_estimate(estimate: MeshEstimate, rules: Rules) -> Division:
     return replace(division, why=choice.why)
 
 
-def slow_rows(rules: Rules) -> NDArray[np.bool_]:
+def _slow_rows(rules: Rules) -> NDArray[np.bool_]:
     """Return the rows of an estimated mesh that take the window, shape (n,).
 
     They are the board, or in one-way coupling all rows of the driving model.
@@ -155,11 +162,11 @@ def slow_rows(rules: Rules) -> NDArray[np.bool_]:
 
 
 def plan_estimate(estimate: MeshEstimate, rules: Rules) -> WindowPlan:
-    """Return windows and substeps of an estimated mesh, with the substeps of a DNS."""
-    return plan_windows(rules, slow_rows(rules), estimate.steps)
+    """Return windows and substeps of an estimated mesh; the substeps are the steps of a DNS in a window."""
+    return plan_windows(rules, _slow_rows(rules), estimate.steps)
 
 
 def longest_window(estimate: MeshEstimate, rules: Rules) -> float:
     """Return the longest window [s] that the elements of an estimated mesh allow, for runs of any duration."""
-    slow = damped_critical_step(estimate.steps[slow_rows(rules)], rules.stiffness)
+    slow = damped_critical_step(estimate.steps[_slow_rows(rules)], rules.stiffness)
     return rules.fraction * float(slow.min())

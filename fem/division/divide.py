@@ -25,31 +25,47 @@ WINDOW_COST = WINDOW_OVERHEAD * UPDATES_PER_SECOND * BOARD_ADVANTAGE  # in updat
 
 
 def divide(whole: Whole, survey: Survey, rules: Rules) -> Division:
-    """Choose scheme, models, levels and window; ``checks.check_division`` then checks the result.
+    """Divide a mesh into macro and meso model: choose scheme, cells, step levels and window.
+
+    The result is not checked yet; ``checks.check_division`` does that.
+
+    Args:
+        whole: Joined mesh with its ties.
+        survey: Critical steps, costs and linearity of its cells.
+        rules: Settings of the division.
 
     Raises:
         LevelError: The critical steps differ by more than the levels allow.
     """
     choice = scheme_for(whole, survey, rules)
     if rules.copied is not None and rules.copy is not None:
-        return replace(divide_for_one_way(whole, survey, rules, rules.copied, rules.copy), why=choice.why)
+        return replace(_divide_for_one_way(whole, survey, rules, rules.copied, rules.copy), why=choice.why)
     divided = {
-        "held_velocity": divide_for_held_velocity,
-        "impulse": divide_for_impulse,
-        "gravouil_combescure": divide_for_gravouil_combescure,
-        "local_steps": divide_for_local_steps,
+        "held_velocity": _divide_for_held_velocity,
+        "impulse": _divide_for_impulse,
+        "gravouil_combescure": _divide_for_gravouil_combescure,
+        "local_steps": _divide_for_local_steps,
     }
     return replace(divided[choice.scheme](whole, survey, rules), why=choice.why)
 
 
 def scheme_for(whole: Whole, survey: Survey, rules: Rules) -> Choice:
-    """Return the scheme for a mesh, with the reason; raises as ``decide_scheme``."""
+    """Return the coupling scheme for a joined mesh, with the reason; raises as ``decide_scheme``.
+
+    Args:
+        whole: Joined mesh with its ties.
+        survey: Critical steps and linearity of its cells.
+        rules: Settings; ``coupling.scheme`` other than "auto" is returned unchanged.
+    """
     return decide_scheme(
-        rules, survey.step, bool(survey.linear.all()), lambda: bool(buffered_division(whole, survey, rules).macro.any())
+        rules,
+        survey.step,
+        bool(survey.linear.all()),
+        lambda: bool(_buffered_division(whole, survey, rules).macro.any()),
     )
 
 
-def buffered_division(whole: Whole, survey: Survey, rules: Rules) -> Division:
+def _buffered_division(whole: Whole, survey: Survey, rules: Rules) -> Division:
     """Return the division of held velocity: the meso model includes layers of board.
 
     These layers surround all cells that do not belong to the board. The window follows the macro model and all
@@ -60,9 +76,9 @@ def buffered_division(whole: Whole, survey: Survey, rules: Rules) -> Division:
     return held_velocity_division(whole, survey, rules, ~rules.coarse | buffer)
 
 
-def divide_for_held_velocity(whole: Whole, survey: Survey, rules: Rules) -> Division:
+def _divide_for_held_velocity(whole: Whole, survey: Survey, rules: Rules) -> Division:
     """Return the buffered division, with levels in the meso model if no load or damping forbids them."""
-    division = buffered_division(whole, survey, rules)
+    division = _buffered_division(whole, survey, rules)
     meso = nodes_of(whole.mesh.cells, division.meso, len(whole.mesh.points))
     pushed = rules.pushed or meso[list(rules.shaken)].any()
     if pushed:
@@ -77,9 +93,9 @@ def divide_for_held_velocity(whole: Whole, survey: Survey, rules: Rules) -> Divi
     return in_path_levels(division, rules, limits, around)
 
 
-def divide_for_impulse(whole: Whole, survey: Survey, rules: Rules) -> Division:
+def _divide_for_impulse(whole: Whole, survey: Survey, rules: Rules) -> Division:
     """Return the division of the impulse scheme: the cells of held velocity, the interface in the meso model."""
-    return replace(buffered_division(whole, survey, rules), scheme="impulse")
+    return replace(_buffered_division(whole, survey, rules), scheme="impulse")
 
 
 def held_velocity_division(whole: Whole, survey: Survey, rules: Rules, meso: NDArray[np.bool_]) -> Division:
@@ -88,7 +104,7 @@ def held_velocity_division(whole: Whole, survey: Survey, rules: Rules, meso: NDA
     return in_two_steps("held_velocity", ~meso, meso, plan_windows(rules, slow, survey.step))
 
 
-def divide_for_one_way(
+def _divide_for_one_way(
     whole: Whole, survey: Survey, rules: Rules, copied: NDArray[np.bool_], copy: NDArray[np.bool_]
 ) -> Division:
     """Return the division of one-way coupling: the meso model has the fine cells and layers of cells around them.
@@ -110,7 +126,7 @@ def cut_nodes(cells: NDArray[np.int32], meso: NDArray[np.bool_], count: int) -> 
     return nodes_of(cells, meso, count) & nodes_of(cells, ~meso, count)
 
 
-def divide_for_gravouil_combescure(_whole: Whole, survey: Survey, rules: Rules) -> Division:
+def _divide_for_gravouil_combescure(_whole: Whole, survey: Survey, rules: Rules) -> Division:
     """Return the division of Gravouil-Combescure: the meso model is everything but the board.
 
     Both models are coupled at the tied nodes.
@@ -119,7 +135,7 @@ def divide_for_gravouil_combescure(_whole: Whole, survey: Survey, rules: Rules) 
     return in_two_steps("gravouil_combescure", rules.coarse, ~rules.coarse, plan)
 
 
-def divide_for_local_steps(whole: Whole, survey: Survey, rules: Rules) -> Division:
+def _divide_for_local_steps(whole: Whole, survey: Survey, rules: Rules) -> Division:
     """Return the division of local steps with the window and levels of least predicted cost.
 
     Raises:
@@ -127,31 +143,31 @@ def divide_for_local_steps(whole: Whole, survey: Survey, rules: Rules) -> Divisi
     """
     critical = damped_critical_step(survey.step, rules.stiffness)
     divisions, failure = [], LevelError("no window was tried")
-    for step in window_steps(critical[rules.coarse if rules.coarse.any() else ...]):
+    for step in _window_steps(critical[rules.coarse if rules.coarse.any() else ...]):
         try:
-            divisions.append(levels_below(whole, survey, step, rules))
+            divisions.append(_levels_below(whole, survey, step, rules))
         except LevelError as error:
             failure = error
     if not divisions:
         raise failure
     useful = [division for division in divisions if division.meso.any() and division.macro.any()]
-    return min(useful or divisions, key=lambda division: predicted_cost(division, survey.cost))
+    return min(useful or divisions, key=lambda division: _predicted_cost(division, survey.cost))
 
 
-def window_steps(coarse: NDArray[np.float64]) -> Iterator[float]:
+def _window_steps(coarse: NDArray[np.float64]) -> Iterator[float]:
     """Yield candidate critical steps for the window [s], from the critical steps of the coarse cells [s]."""
     natural = np.quantile(coarse, EXCEPTIONS, method="lower")
     yield from np.unique(np.outer(natural, SHARES)).tolist()
 
 
-def levels_below(whole: Whole, survey: Survey, step: float, rules: Rules) -> Division:
+def _levels_below(whole: Whole, survey: Survey, step: float, rules: Rules) -> Division:
     """Return the division in levels for a window from a critical step [s]; raises as ``choose_levels``."""
     plan = rules.plan(step, step)
     limits = StepLimits(survey.step, survey.cost, plan.window, rules.fraction, rules.stiffness)
     return in_local_steps(whole.mesh.cells, whole.tie, limits, plan, rules.coupling.most_levels)
 
 
-def predicted_cost(division: Division, cost: NDArray[np.float64]) -> float:
+def _predicted_cost(division: Division, cost: NDArray[np.float64]) -> float:
     """Return the cost per second of simulated time, from the cost of an update of each cell, shape (ne,)."""
     counts = np.cumprod([1, *division.ratios])
     updates = float(cost @ counts[division.level]) + SUBSTEP_COST * float(counts[1:].sum())

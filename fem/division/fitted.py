@@ -70,9 +70,9 @@ def fitted(mesh: MeshData, fittings: Fittings, symmetry: Sequence[str], slaves: 
     }
     points = point_table(mesh, {name: point.at for name, point in fittings.watch.items()}, supports, yields)
     return FittedTable(
-        points=replace(points, gauges=gauge_table(mesh, fittings.gauges, symmetry)),
+        points=replace(points, gauges=_gauge_table(mesh, fittings.gauges, symmetry)),
         bedded={name: outward_facets(mesh, item.on) for name, item in fittings.supports.items() if item.bedding},
-        masses=lumped_masses(mesh, fittings.masses, symmetry),
+        masses=_lumped_masses(mesh, fittings.masses, symmetry),
     )
 
 
@@ -84,7 +84,7 @@ def fit_to_mesh(mesh: MeshData, chosen: NDArray[np.bool_], fittings: Fittings, y
     return fitted(body, fittings, symmetry, np.empty(0, np.int32), yields).within(nodes, cells, nodes)
 
 
-def lumped_masses(mesh: MeshData, masses: Mapping[str, PointMass], symmetry: Sequence[str]) -> Shares:
+def _lumped_masses(mesh: MeshData, masses: Mapping[str, PointMass], symmetry: Sequence[str]) -> Shares:
     """Return the nodes with lumped masses and the mass at each [kg]; arguments and errors as in ``fitted``."""
     nodes, shares = [np.empty(0, np.int64)], [np.empty(0)]
     margin = ROUNDING * float(np.ptp(mesh.points, axis=0).max())
@@ -99,9 +99,9 @@ def lumped_masses(mesh: MeshData, masses: Mapping[str, PointMass], symmetry: Seq
     return numbers, total
 
 
-def gauge_table(mesh: MeshData, gauges: Mapping[str, StrainGauge], symmetry: Sequence[str]) -> GaugeTable:
+def _gauge_table(mesh: MeshData, gauges: Mapping[str, StrainGauge], symmetry: Sequence[str]) -> GaugeTable:
     """Return the table of strain gauges; arguments and errors as in ``fitted``."""
-    located = [find_gauge(mesh, name, gauge, symmetry) for name, gauge in gauges.items()]
+    located = [_find_gauge(mesh, name, gauge, symmetry) for name, gauge in gauges.items()]
     if not located:
         return GaugeTable.none()
     directions, lengths, nodes, weights = zip(*located, strict=True)
@@ -115,7 +115,7 @@ def gauge_table(mesh: MeshData, gauges: Mapping[str, StrainGauge], symmetry: Seq
     )
 
 
-def find_gauge(mesh: MeshData, name: str, gauge: StrainGauge, symmetry: Sequence[str]) -> Gauge:
+def _find_gauge(mesh: MeshData, name: str, gauge: StrainGauge, symmetry: Sequence[str]) -> Gauge:
     """Return direction (3,), length [m], nodes (k,) and weights (k, 3) of a gauge, see ``GaugeTable``.
 
     The mirror image replaces an end beyond a symmetry plane.

@@ -27,23 +27,27 @@ LAYERS = ("solder", "substrate", "die")
 def with_neighbours(mesh: MeshData, neighbours: Mapping[str, Neighbour]) -> MeshData:
     """Add neighbouring packages to the board of a mesh, with the facet sets that ``tie_joints`` needs.
 
+    Args:
+        mesh: Mesh with the board.
+        neighbours: Name -> position and sizes of a package on the same board; empty leaves the mesh unchanged.
+
     Raises:
         MeshError: A package lies outside the board.
     """
     for name, item in neighbours.items():
-        package = neighbour_mesh(name, item)
+        package = _neighbour_mesh(name, item)
         mesh = append([mesh, package])
-        below = facets_below(mesh, package.points[package.facet_nodes(f"slave@neighbour_{name}")])
+        below = _facets_below(mesh, package.points[package.facet_nodes(f"slave@neighbour_{name}")])
         if not len(below):
             raise MeshError(f"packages.{name}: there is no board below it")
         mesh = replace(mesh, facets=mesh.facets | {f"master@neighbour_{name}": below})
     return mesh
 
 
-def neighbour_mesh(name: str, item: Neighbour) -> MeshData:
+def _neighbour_mesh(name: str, item: Neighbour) -> MeshData:
     """Return the mesh of a package, with the lower faces of its posts as facet set ``slave@neighbour_NAME``."""
-    posts = [post_edges(item, *axis) for axis in zip(item.at, (item.columns, item.rows), strict=True)]
-    lines = [grid_lines(posts[k], (item.at[k], item.substrate[k], item.die[k]), item.pitch) for k in range(2)]
+    posts = [_post_edges(item, *axis) for axis in zip(item.at, (item.columns, item.rows), strict=True)]
+    lines = [_grid_lines(posts[k], (item.at[k], item.substrate[k], item.die[k]), item.pitch) for k in range(2)]
     heights = np.cumsum([0.0, item.standoff, item.substrate[2], item.die[2]])
     points = np.stack(np.meshgrid(*lines, heights, indexing="ij"), axis=-1).reshape(-1, 3)
     shape = tuple(len(axis) for axis in (*lines, heights))
@@ -52,7 +56,7 @@ def neighbour_mesh(name: str, item: Neighbour) -> MeshData:
     corners = [number[side[a & 1], side[a >> 1 & 1], side[a >> 2]].ravel() for a in range(HEXAHEDRON.nodes)]
     cells, part = np.stack(corners, axis=1), np.tile(np.arange(3, dtype=np.int32), (shape[0] - 1) * (shape[1] - 1))
     x, y = points[cells].mean(axis=1)[:, :2].T
-    in_post = within(x, posts[0]) & within(y, posts[1])
+    in_post = _within(x, posts[0]) & _within(y, posts[1])
     in_die = (np.abs(x - item.at[0]) < 0.5 * item.die[0]) & (np.abs(y - item.at[1]) < 0.5 * item.die[1])
     is_solid = np.choose(part, [in_post, True, in_die])
     names = tuple(f"{layer}_{name}" for layer in LAYERS)
@@ -61,19 +65,19 @@ def neighbour_mesh(name: str, item: Neighbour) -> MeshData:
     return without_unused_nodes(mesh)[0]
 
 
-def within(places: NDArray[np.float64], edges: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _within(places: NDArray[np.float64], edges: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return which coordinates, shape (n,), lie in one of the intervals, shape (k, 2)."""
     first = np.searchsorted(edges[:, 0], places) - 1
     return np.asarray((first >= 0) & (places < edges[first, 1]))
 
 
-def post_edges(item: Neighbour, centre: float, count: int) -> NDArray[np.float64]:
+def _post_edges(item: Neighbour, centre: float, count: int) -> NDArray[np.float64]:
     """Return start and end of each post along an axis, shape (count, 2) [m]."""
     middle = centre + item.pitch * (np.arange(count) - 0.5 * (count - 1))
     return middle[:, None] + 0.5 * item.post * np.array([-1.0, 1.0])
 
 
-def grid_lines(edges: NDArray[np.float64], box: Sequence[float], pitch: float) -> NDArray[np.float64]:
+def _grid_lines(edges: NDArray[np.float64], box: Sequence[float], pitch: float) -> NDArray[np.float64]:
     """Return the grid lines along an axis [m]: edges of posts, substrate and die, at most one pitch apart.
 
     Args:
@@ -92,7 +96,7 @@ def grid_lines(edges: NDArray[np.float64], box: Sequence[float], pitch: float) -
     return np.concatenate([*pieces, lines[-1:]])
 
 
-def facets_below(mesh: MeshData, feet: NDArray[np.float64]) -> NDArray[np.int32]:
+def _facets_below(mesh: MeshData, feet: NDArray[np.float64]) -> NDArray[np.int32]:
     """Return the facets of the board's upper face below points, shape (n, 3) [m], in cyclic order, shape (nf, 4)."""
     board = mesh.cells[mesh.in_parts(lambda name: role_of_part(name) == "board" and "@" not in name)]
     corners = mesh.points[board]

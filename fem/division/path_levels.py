@@ -42,22 +42,22 @@ def with_path_levels(division: Division, limits: StepLimits, around: Around, mos
         level = finer.level(ratios)
         return float(limits.cost @ np.array([0, *counts])[level]) + SUBSTEP_COST * float(counts.sum())
 
-    ratios = min(candidates(plan.substeps, min(MOST_LEVELS, most)), key=cost)
+    ratios = min(_candidates(plan.substeps, min(MOST_LEVELS, most)), key=cost)
     return replace(division, level=finer.level(ratios), ratios=ratios, plan=replace(plan, substeps=math.prod(ratios)))
 
 
-def candidates(substeps: int, most: int) -> Iterator[tuple[int, ...]]:
+def _candidates(substeps: int, most: int) -> Iterator[tuple[int, ...]]:
     """Yield ratios of one to ``most`` levels whose product is the smallest that reaches ``substeps``."""
     yield (substeps,)
     if most > 1:
         for first in range(1, substeps):
-            for inner in candidates(-(-substeps // first), most - 1):
+            for inner in _candidates(-(-substeps // first), most - 1):
                 if inner[0] > 1:
                     yield (first, *inner)
 
 
 def opaque_ratio(fraction: float) -> float:
-    """Return the critical step, relative to the larger step, above which one layer decays as much as two.
+    """Return the ratio of critical step to step above which one layer of cells decays a wave as much as two layers.
 
     Both steps are ``fraction`` of critical steps. The decay exponent doubles if arcosh(r x) = 2 arcosh(x).
     """

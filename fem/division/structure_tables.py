@@ -67,7 +67,7 @@ def tie_layers(mesh: MeshData, problem: StructureProblem) -> Whole:
         MeshError: The cell shape, or the set of layers, differs between mesh and input.
         TieError: Layers with different meshes do not touch.
     """
-    check_layers(mesh, problem)
+    _check_layers(mesh, problem)
     return Whole(*tie_joints(mesh))
 
 
@@ -84,9 +84,9 @@ def structure_tables(whole: Whole, problem: StructureProblem) -> StructureTables
     for name in sets:  # slaves follow their masters
         nodes_of[name] = np.setdiff1d(facet_set(mesh, name), tie.slave)
     pressed = {load.on for load in problem.loads.values() if isinstance(load, OnAreas)}
-    held = held_by_supports(mesh, problem)
-    check_motions(problem, nodes_of, held)
-    check_shaken(problem, nodes_of, held)
+    held = _held_by_supports(mesh, problem)
+    _check_motions(problem, nodes_of, held)
+    _check_shaken(problem, nodes_of, held)
     yields = bool(plastic_laws(problem.layer_materials))
     return StructureTables.undivided(
         whole,
@@ -94,12 +94,12 @@ def structure_tables(whole: Whole, problem: StructureProblem) -> StructureTables
         nodes_of=nodes_of,
         areas={name: outward_areas(mesh, name) for name in sorted(pressed)},
         pressed={name: outward_facets(mesh, name) for name in sorted(pressed)},
-        pushed=pushed_nodes(mesh, problem),
+        pushed=_pushed_nodes(mesh, problem),
         fitted=fitted(mesh, problem.fittings, problem.structure.symmetry, tie.slave, yields),
     )
 
 
-def pushed_nodes(mesh: MeshData, problem: StructureProblem) -> dict[str, Shares]:
+def _pushed_nodes(mesh: MeshData, problem: StructureProblem) -> dict[str, Shares]:
     """Return nodes and shares of the point forces, see ``StructureTables.pushed``; raises as ``structure_tables``."""
     pushed: dict[str, Shares] = {}
     for name, load in problem.loads.items():
@@ -109,7 +109,7 @@ def pushed_nodes(mesh: MeshData, problem: StructureProblem) -> dict[str, Shares]
     return pushed
 
 
-def check_layers(mesh: MeshData, problem: StructureProblem) -> None:
+def _check_layers(mesh: MeshData, problem: StructureProblem) -> None:
     """Check that cells and parts of the mesh match elements and layers of the input; raises as ``tie_layers``."""
     element = problem.structure.element
     if mesh.shape.nodes != NODES[element]:
@@ -126,7 +126,9 @@ def check_layers(mesh: MeshData, problem: StructureProblem) -> None:
         )
 
 
-def check_motions(problem: StructureProblem, nodes_of: dict[str, NDArray[np.integer]], held: NDArray[np.bool_]) -> None:
+def _check_motions(
+    problem: StructureProblem, nodes_of: dict[str, NDArray[np.integer]], held: NDArray[np.bool_]
+) -> None:
     """Check that no motion acts on fixed components, shape (n, 3); raises as ``structure_tables``."""
     for name, load in problem.loads.items():
         if not isinstance(load, PrescribedMotion):
@@ -140,7 +142,7 @@ def check_motions(problem: StructureProblem, nodes_of: dict[str, NDArray[np.inte
             )
 
 
-def check_shaken(problem: StructureProblem, nodes_of: dict[str, NDArray[np.integer]], held: NDArray[np.bool_]) -> None:
+def _check_shaken(problem: StructureProblem, nodes_of: dict[str, NDArray[np.integer]], held: NDArray[np.bool_]) -> None:
     """Check that no large mass acts on fixed components, shape (n, 3); raises as ``structure_tables``."""
     for name in shaken_supports(problem):
         nodes = nodes_of[problem.supports[name].on]
@@ -158,7 +160,7 @@ def shaken_supports(problem: StructureProblem) -> list[str]:
     return [name for name, support in problem.supports.items() if by_mass and set(support.hold) == set(AXES)]
 
 
-def held_by_supports(mesh: MeshData, problem: StructureProblem) -> NDArray[np.bool_]:
+def _held_by_supports(mesh: MeshData, problem: StructureProblem) -> NDArray[np.bool_]:
     """Return the components that supports and symmetry planes fix, shape (n, 3)."""
     shaken = shaken_supports(problem)
     rules = [(support.on, support.hold) for name, support in problem.supports.items() if name not in shaken]

@@ -166,7 +166,7 @@ def join_meshes(data: MeshData) -> Whole:
 def prepare(
     data: MeshData, division: Division | Literal["dns"], rules: Mapping[str, Sequence[int]] = HELD
 ) -> dict[Role, ModelInput[JointTables]]:
-    """Join a mesh and split it into its models; see ``model_inputs``."""
+    """Join the meshes of a package on a board and split them into models; arguments and models as ``model_inputs``."""
     return model_inputs(join_meshes(data), division, rules)
 
 
@@ -189,16 +189,24 @@ def model_inputs(
     if division != "dns":
         return split(whole, tables, division)
     part = part_of(whole, np.ones(len(whole.mesh.cells), dtype=bool))
-    return {"dns": part_input(whole, tables, part, part.number, part.cell_number)}
+    return {"dns": _part_input(whole, tables, part, part.number, part.cell_number)}
 
 
 def split(whole: Whole, tables: TablesT, division: Division) -> dict[Role, ModelInput[TablesT]]:
-    """Split a mesh with its tables into ``macro`` and ``meso``; shared nodes and cells count in the macro model."""
+    """Split a mesh with its tables into the models ``macro`` and ``meso``.
+
+    Nodes and cells in both models are loaded and watched in the macro model only.
+
+    Args:
+        whole: Joined mesh with its ties.
+        tables: Loads, supports and watch points in the numbers of this mesh.
+        division: Cells of each model.
+    """
     macro, meso = part_of(whole, division.macro), part_of(whole, division.meso)
     interface = interface_between(whole, part_of(whole, division.around), meso)
     rest = np.where(macro.number < 0, meso.number, -1), np.where(macro.cell_number < 0, meso.cell_number, -1)
-    coarse = part_input(whole, tables, macro, macro.number, macro.cell_number)
-    fine = part_input(whole, tables, meso, *rest)
+    coarse = _part_input(whole, tables, macro, macro.number, macro.cell_number)
+    fine = _part_input(whole, tables, meso, *rest)
     coarse_tables = replace(coarse.tables, interface=macro.number[interface])
     fine_tables = replace(fine.tables, interface=meso.number[interface], every=division.every[division.meso])
     if division.local:
@@ -206,7 +214,7 @@ def split(whole: Whole, tables: TablesT, division: Division) -> dict[Role, Model
     return {"macro": replace(coarse, tables=coarse_tables), "meso": replace(fine, tables=fine_tables)}
 
 
-def part_input(
+def _part_input(
     whole: Whole, tables: TablesT, part: Part, node: NDArray[np.int32], cell: NDArray[np.int32]
 ) -> ModelInput[TablesT]:
     """Return a part of a mesh as a model without an interface.

@@ -84,7 +84,12 @@ class Survey:
 
 
 def survey(mesh: MeshData, materials: Materials | Mapping[str, Material], treatment: Treatment) -> Survey:
-    """Determine the properties of the elements of a mesh.
+    """Determine critical steps, masses, linearity and costs of the elements of a mesh.
+
+    Args:
+        mesh: Mesh with named parts.
+        materials: Material of each role.
+        treatment: Formulation, kinematics and mass scaling.
 
     Raises:
         MeshError: An element is inverted.
@@ -106,7 +111,7 @@ def survey(mesh: MeshData, materials: Materials | Mapping[str, Material], treatm
     return Survey(
         role=role,
         plain_step=step,
-        factor=mass_factors(step, scaled, treatment),
+        factor=_mass_factors(step, scaled, treatment),
         mass=elements.density * geometry.volume,
         linear=linear,
         cost=np.where(linear, np.where(box, 1.0, BOARD_ADVANTAGE), BOARD_ADVANTAGE * UPDATES_PER_SECOND / rate),
@@ -116,7 +121,14 @@ def survey(mesh: MeshData, materials: Materials | Mapping[str, Material], treatm
 def add_spring_stiffness(
     survey: Survey, mesh: MeshData, table: FittedTable | None, supports: Mapping[str, Support]
 ) -> Survey:
-    """Return a survey with critical steps reduced by elastic supports."""
+    """Return a survey with critical steps reduced by elastic supports.
+
+    Args:
+        survey: Properties of the elements without supports.
+        mesh: Mesh of these elements.
+        table: Facets of the elastic supports; None returns the same critical steps.
+        supports: Name -> support with its stiffness per area [N/m^3].
+    """
     added_frequency = np.zeros(len(survey.plain_step))  # squared circular frequency [1/s^2]
     for name, facets in table.bedded.items() if table else ():
         cells, corners = mesh.cells[facets.cells], mesh.points[facets.facets]
@@ -127,7 +139,7 @@ def add_spring_stiffness(
     return replace(survey, plain_step=2.0 / np.sqrt((2.0 / survey.plain_step) ** 2 + added_frequency))
 
 
-def mass_factors(step: NDArray[np.float64], scaled: NDArray[np.bool_], treatment: Treatment) -> NDArray[np.float64]:
+def _mass_factors(step: NDArray[np.float64], scaled: NDArray[np.bool_], treatment: Treatment) -> NDArray[np.float64]:
     """Return the density factor that raises critical steps to those of unscaled elements or to a limit, shape (ne,).
 
     Args:

@@ -28,27 +28,27 @@ from reflowshock.fem.loads.load import Load
 from reflowshock.fem.model.body import Body
 
 
-def none_of(*shape: int, kind: type = np.float64) -> Any:
+def _none_of(*shape: int, kind: type = np.float64) -> Any:
     """Return an empty array of the given shape, for the unused arguments of a kernel."""
     return np.zeros(shape, kind)
 
 
-NODES, AXES, ROWS = none_of(0, kind=np.int32), none_of(3, kind=np.int64), none_of(0, 6, kind=np.int32)
-CELLS, LINES, BY_LANE = none_of(0, 8, LANES, kind=np.int32), none_of(2, 3, 0), none_of(0, LANES)
+NODES, AXES, ROWS = _none_of(0, kind=np.int32), _none_of(3, kind=np.int64), _none_of(0, 6, kind=np.int32)
+CELLS, LINES, BY_LANE = _none_of(0, 8, LANES, kind=np.int32), _none_of(2, 3, 0), _none_of(0, LANES)
 NOTHING = ForceArrays(
-    congruent=(NODES, AXES, ROWS, none_of(0, 8, 6), LINES),
-    assembled=(none_of(1, kind=np.int32), NODES, none_of(0, 3, 3)),
-    turning_rows=(NODES, AXES, ROWS, none_of(0, 3), none_of(0, 27), LINES),
-    turning_boxes=(CELLS, NODES, none_of(0, 30 * LANES)),
-    turning=(CELLS, NODES, none_of(0, 120 * LANES)),
+    congruent=(NODES, AXES, ROWS, _none_of(0, 8, 6), LINES),
+    assembled=(_none_of(1, kind=np.int32), NODES, _none_of(0, 3, 3)),
+    turning_rows=(NODES, AXES, ROWS, _none_of(0, 3), _none_of(0, 27), LINES),
+    turning_boxes=(CELLS, NODES, _none_of(0, 30 * LANES)),
+    turning=(CELLS, NODES, _none_of(0, 120 * LANES)),
     one_point=OnePointBlocks(
-        *(CELLS, NODES, NODES, NODES, none_of(0, 9), none_of(0, 6), none_of(0, 120 * LANES), none_of(0, 1, LANES)),
-        *(none_of(0, 1, STATE_SLOTS), BY_LANE, BY_LANE, none_of(0, 12 * LANES), none_of(0)),
+        *(CELLS, NODES, NODES, NODES, _none_of(0, 9), _none_of(0, 6), _none_of(0, 120 * LANES), _none_of(0, 1, LANES)),
+        *(_none_of(0, 1, STATE_SLOTS), BY_LANE, BY_LANE, _none_of(0, 12 * LANES), _none_of(0)),
     ),
     hexahedron=HexahedronBlocks(
-        *(CELLS, NODES, NODES, NODES, none_of(0, 9), none_of(0, 6), none_of(0, 21 * LANES), none_of(0, 9 * LANES)),
-        *(none_of(0, 8, LANES), none_of(0, 8, LANES), none_of(0, 32 * LANES), none_of(0, 6 * LANES)),
-        *(none_of(0, 8, 7 * LANES), none_of(0, 21 * LANES), BY_LANE, BY_LANE),
+        *(CELLS, NODES, NODES, NODES, _none_of(0, 9), _none_of(0, 6), _none_of(0, 21 * LANES), _none_of(0, 9 * LANES)),
+        *(_none_of(0, 8, LANES), _none_of(0, 8, LANES), _none_of(0, 32 * LANES), _none_of(0, 6 * LANES)),
+        *(_none_of(0, 8, 7 * LANES), _none_of(0, 21 * LANES), BY_LANE, BY_LANE),
     ),
     path=Path(False, np.inf),
 )
@@ -56,7 +56,7 @@ NOTHING = ForceArrays(
 
 def no_interface(steps: int) -> Interface:
     """Return an empty coupling interface for a number of steps."""
-    return Interface(NODES, NODES, none_of(0, 3), none_of(steps, 3), none_of(steps + 1, 2), none_of(2, 0, 3))
+    return Interface(NODES, NODES, _none_of(0, 3), _none_of(steps, 3), _none_of(steps + 1, 2), _none_of(2, 0, 3))
 
 
 @dataclass(frozen=True, slots=True)

@@ -59,17 +59,17 @@ def energy_sums(participant: Participant, sign: float) -> NDArray[np.float64]:
     nodes = nodes[body.shared.owned[nodes]]
     points, interface = body.local.points[nodes], participant.interface_force()[nodes]
     interface_load = -sign * net_load(points, interface)
-    interface_scale = 0.5 * abs(sign) * load_scale(points, interface)
-    tie_load, tie_scale = tie_residual(participant)
+    interface_scale = 0.5 * abs(sign) * _load_scale(points, interface)
+    tie_load, tie_scale = _tie_residual(participant)
     return np.concatenate([energies, interface_load, interface_scale, tie_load, tie_scale])
 
 
-def load_scale(points: NDArray[np.float64], force: NDArray[np.float64]) -> NDArray[np.float64]:
+def _load_scale(points: NDArray[np.float64], force: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the sums of absolute forces [N] and of absolute moments about the origin [N m], shape (2,)."""
     return np.array([np.abs(force).sum(), np.abs(np.cross(points, force)).sum()])
 
 
-def tie_residual(participant: Participant) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _tie_residual(participant: Participant) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the net force and moment lost between slaves and masters, shape (6,), and their scales, shape (2,)."""
     motion = participant.motion
     tie, points = motion.body.tie, motion.body.local.points
@@ -78,7 +78,7 @@ def tie_residual(participant: Participant) -> tuple[NDArray[np.float64], NDArray
     force[tie.slave] = motion.slave_force
     tie.gather(force)
     masters = np.unique(tie.master)
-    return net_load(*slave_load) - net_load(points[masters], force[masters]), load_scale(*slave_load)
+    return net_load(*slave_load) - net_load(points[masters], force[masters]), _load_scale(*slave_load)
 
 
 @dataclass(slots=True)

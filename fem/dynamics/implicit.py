@@ -104,7 +104,7 @@ class ImplicitMotion(Motion):
     @staticmethod
     def check(body: Body) -> None:
         """Raise ``ValueError`` if the model is not linear."""
-        check_linear(body)
+        _check_linear(body)
 
     def _factorise(self) -> Factorisation:
         """Return the factorisation of M + (1 + alpha) (gamma h C + beta h^2 K), C = a M + b K; collective."""
@@ -308,7 +308,7 @@ class ImplicitMotion(Motion):
             load.restore(state["loads"][str(k)])
 
 
-def check_linear(body: Body) -> None:
+def _check_linear(body: Body) -> None:
     """Raise ``ValueError`` if the force of an element is not a constant matrix times the displacement."""
     nonlinear = [
         term for term in body.terms if not isinstance(term, CongruentElements | AssembledElements | BeddedFacets)

@@ -52,7 +52,7 @@ def natural_modes(equations: Equations, count: int) -> Modes:
     """
     if not 0 < count < equations.total:
         raise ValueError(f"number of modes = {count}; allowed: 1 to {equations.total - 1}")
-    solve = scipy_modes if SLEPc is None else slepc_modes
+    solve = _scipy_modes if SLEPc is None else _slepc_modes
     stiffness, mass = equations.stiffness(), equations.mass()
     shift = -SHIFT * float((stiffness.getDiagonal() / mass).max()[1])
     squared, vectors = solve(stiffness, mass, shift, count)
@@ -63,23 +63,23 @@ def natural_modes(equations: Equations, count: int) -> Modes:
         vector = vectors[index]
         vector.scale(1.0 / np.sqrt((vector * mass).dot(vector)))
         equations.spread(vector, shape)
-        moving[:] = momentum(equations, shape) ** 2
+        moving[:] = _momentum(equations, shape) ** 2
     frequency = np.sqrt(np.maximum(squared[order], 0.0)) / (2.0 * np.pi)
     return Modes(frequency, shapes, effective)
 
 
-def momentum(equations: Equations, shape: NDArray[np.float64]) -> NDArray[np.float64]:
+def _momentum(equations: Equations, shape: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the sum over all ranks of mass times mode shape, shape (3,) [sqrt(kg)]."""
     owned = equations.body.shared.owned
     return np.asarray(equations.comm.allreduce(equations.body.mass[owned] @ shape[owned]))
 
 
-def slepc_modes(
+def _slepc_modes(
     stiffness: PETSc.Mat, mass: PETSc.Vec, shift: float, count: int
 ) -> tuple[NDArray[np.float64], list[PETSc.Vec]]:
     """Return squared circular frequencies [1/s^2] and eigenvectors by SLEPc's Krylov-Schur, on any number of ranks."""
     solver = SLEPc.EPS().create(stiffness.comm)
-    solver.setOperators(stiffness, diagonal_matrix(mass))
+    solver.setOperators(stiffness, _diagonal_matrix(mass))
     solver.setProblemType(SLEPc.EPS.ProblemType.GHEP)
     solver.setDimensions(count)
     solver.setTolerances(TOLERANCE)
@@ -98,7 +98,7 @@ def slepc_modes(
     return np.array(values), vectors
 
 
-def diagonal_matrix(diagonal: PETSc.Vec) -> PETSc.Mat:
+def _diagonal_matrix(diagonal: PETSc.Vec) -> PETSc.Mat:
     """Return a sparse diagonal matrix with the given diagonal."""
     matrix = PETSc.Mat().createAIJ((diagonal.sizes, diagonal.sizes), nnz=(1, 0), comm=diagonal.comm)
     matrix.setDiagonal(diagonal)
@@ -106,7 +106,7 @@ def diagonal_matrix(diagonal: PETSc.Vec) -> PETSc.Mat:
     return matrix
 
 
-def scipy_modes(
+def _scipy_modes(
     stiffness: PETSc.Mat, mass: PETSc.Vec, shift: float, count: int
 ) -> tuple[NDArray[np.float64], list[PETSc.Vec]]:
     """Return squared circular frequencies [1/s^2] and eigenvectors by SciPy's ARPACK, on one rank."""

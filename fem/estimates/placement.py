@@ -86,7 +86,7 @@ def disjoint(macro: Sequence[int], size: int) -> Placement:
     return Placement({"macro": tuple(sorted(macro)), "meso": others})
 
 
-def admissible(ranks: Ranks, speeds: Sequence[float]) -> Iterator[Placement]:
+def _admissible(ranks: Ranks, speeds: Sequence[float]) -> Iterator[Placement]:
     """Yield the placements of two models that an input allows, the simplest first.
 
     In disjoint placements the macro model takes the slowest or the fastest ranks, so ranks of a model are alike.
@@ -108,7 +108,7 @@ def admissible(ranks: Ranks, speeds: Sequence[float]) -> Iterator[Placement]:
 
 def alternatives(ranks: Ranks, speeds: Sequence[float], cost: WindowCost) -> list[Alternative]:
     """Return all admissible placements of two models with their predicted windows, the fastest first."""
-    candidates = [Alternative(item, window_seconds(item, speeds, cost)) for item in admissible(ranks, speeds)]
+    candidates = [Alternative(item, window_seconds(item, speeds, cost)) for item in _admissible(ranks, speeds)]
     return sorted(candidates, key=lambda item: item.seconds)
 
 

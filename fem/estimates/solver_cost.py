@@ -105,17 +105,17 @@ def forecast_solvers(
         explicit_steps: Steps of the explicit solver.
         implicit_steps: Steps of the implicit solver, see ``implicit_step``.
     """
-    nodes = node_counts(problem)
-    reasons = nonlinearities(problem)
+    nodes = _node_counts(problem)
+    reasons = _nonlinearities(problem)
     structure = problem.structure
     kind = structure.formulation if structure.element == "hexahedron" else structure.element
     rate = (NONLINEAR_RATE if reasons else LINEAR_RATE)[kind]
     return SolverForecast(
-        explicit_cost(elements, math.prod(nodes), explicit_steps, rate), implicit_cost(nodes, implicit_steps), reasons
+        _explicit_cost(elements, math.prod(nodes), explicit_steps, rate), implicit_cost(nodes, implicit_steps), reasons
     )
 
 
-def explicit_cost(elements: int, nodes: int, steps: int, rate: float) -> SolverCost:
+def _explicit_cost(elements: int, nodes: int, steps: int, rate: float) -> SolverCost:
     """Predict the cost of explicit steps at a rate of element updates per second."""
     memory = ELEMENT_MEMORY * elements + NODE_MEMORY * nodes
     return SolverCost(steps, steps * (elements / rate + EXPLICIT_OVERHEAD), 0.0, memory)
@@ -143,7 +143,7 @@ def plate_nodes(elements: int) -> tuple[int, int, int]:
     return side + 1, side + 1, PLATE_LAYERS + 1
 
 
-def node_counts(problem: StructureProblem) -> tuple[int, int, int]:
+def _node_counts(problem: StructureProblem) -> tuple[int, int, int]:
     """Return the nodes along each side of the box, without the nodes that rings around holes add."""
     structure = problem.structure.refined
     layers = sum(layer.cells for layer in structure.layers.values())
@@ -151,7 +151,7 @@ def node_counts(problem: StructureProblem) -> tuple[int, int, int]:
     return order * structure.cells[0] + 1, order * structure.cells[1] + 1, order * layers + 1
 
 
-def nonlinearities(problem: StructureProblem) -> tuple[str, ...]:
+def _nonlinearities(problem: StructureProblem) -> tuple[str, ...]:
     """Return the nonlinearities of a problem as texts; empty for a linear problem."""
     plastic = ", ".join(plastic_laws(problem.layer_materials))
     reasons = [f"plasticity (layers {plastic})"] if plastic else []

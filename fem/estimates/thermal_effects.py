@@ -64,7 +64,7 @@ class PlateLayer:
         return cls(young / (1.0 - ratio), young / (1.0 - ratio**2), material.expansion[0], thickness)
 
 
-def curvature(lower: PlateLayer, upper: PlateLayer) -> float:
+def _curvature(lower: PlateLayer, upper: PlateLayer) -> float:
     """Return the curvature of a two-layer plate per temperature rise [1/(m K)], positive if its edges move up.
 
     Source: Timoshenko, JOSA 11, 1925.
@@ -75,7 +75,7 @@ def curvature(lower: PlateLayer, upper: PlateLayer) -> float:
     return 6.0 * mismatch * (1.0 + m) ** 2 / ((lower.thickness + upper.thickness) * shape)
 
 
-def rigidity(lower: PlateLayer, upper: PlateLayer) -> float:
+def _rigidity(lower: PlateLayer, upper: PlateLayer) -> float:
     """Return the flexural rigidity [N m] of two layers about their common neutral plane."""
     a, b = (layer.one_way * layer.thickness for layer in (lower, upper))
     separate = sum(layer.one_way * layer.thickness**3 for layer in (lower, upper)) / 12.0
@@ -90,7 +90,7 @@ def warpage_number(thermal: Thermal, materials: Mapping[str, Material], sizes: P
     """
     rise = thermal.peak - thermal.reference
     lower, upper = PlateLayer.of(materials["substrate"], sizes.substrate), PlateLayer.of(materials["die"], sizes.die)
-    bow = MARGIN * abs(curvature(lower, upper)) * rise * sizes.reach**2 / 2.0
+    bow = MARGIN * abs(_curvature(lower, upper)) * rise * sizes.reach**2 / 2.0
     forces = [layer.both_ways * layer.thickness for layer in (lower, upper)]
     together = sum(force * layer.expansion for force, layer in zip(forces, (lower, upper), strict=True)) / sum(forces)
     expansions = (together, lower.expansion)
@@ -115,7 +115,7 @@ def solder_force_number(materials: Mapping[str, Material], sizes: PackageSizes, 
     pressure = 2.0 * pi * sizes.pad_radius * surface_tension / sizes.pitch**2
     layers = [PlateLayer.of(materials[role], getattr(sizes, role)) for role in ("board", "substrate", "die")]
     board, substrate = (layer.one_way * layer.thickness**3 / 12.0 for layer in layers[:2])
-    both, bent = rigidity(layers[1], layers[2]), min(sizes.die_reach, sizes.reach)
+    both, bent = _rigidity(layers[1], layers[2]), min(sizes.die_reach, sizes.reach)
     beyond = sizes.reach - bent
     package = 5.0 * bent**4 / (64.0 * both) + beyond * bent**3 / (8.0 * both) + beyond**4 / (8.0 * substrate)
     dents = sum(

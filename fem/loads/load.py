@@ -198,15 +198,15 @@ class NodalForces(Load):
         pattern[local[here]] = forces[here]
         body.tie.gather(pattern)
         body.shared.add(pattern)
-        rows, pattern, owned = nodal_pattern(body, pattern)
+        rows, pattern, owned = _nodal_pattern(body, pattern)
         return cls(rows, pattern, pulse, owned)
 
     def carry(self, body: Body) -> None:
         """Add the reaction of the step levels to the pattern."""
         pattern = np.zeros((len(body.mass), 3))
         pattern[self.nodes] = self.pattern
-        reaction = level_reaction(body, pattern, np.zeros(3))
-        self.nodes, self.pattern, self.owned = nodal_pattern(body, pattern + reaction)
+        reaction = _level_reaction(body, pattern, np.zeros(3))
+        self.nodes, self.pattern, self.owned = _nodal_pattern(body, pattern + reaction)
 
     def add(self, motion: Loaded) -> None:
         """Add the pattern times the pulse at the motion's time."""
@@ -226,13 +226,13 @@ class NodalForces(Load):
 NodalPattern = tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.bool_]]
 
 
-def nodal_pattern(body: Body, pattern: NDArray[np.float64]) -> NodalPattern:
+def _nodal_pattern(body: Body, pattern: NDArray[np.float64]) -> NodalPattern:
     """Return the local nodes ``(k,)`` where a pattern ``(n, 3)`` is not zero, its rows there, and which are owned."""
     rows = np.flatnonzero(pattern.any(axis=1)).astype(np.int32)
     return rows, pattern[rows], body.shared.owned[rows]
 
 
-def level_reaction(body: Body, load: NDArray[np.float64], fall: NDArray[np.float64]) -> NDArray[np.float64]:
+def _level_reaction(body: Body, load: NDArray[np.float64], fall: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the forces ``(n, 3)`` [N] that step levels add to a steady load; collective over the model.
 
     Args:
@@ -263,7 +263,7 @@ class FineSupports(Load):
     def carry(self, body: Body) -> None:
         """Compute the patterns."""
         no_load = np.zeros((len(body.mass), 3))
-        self.patterns = [nodal_pattern(body, level_reaction(body, no_load, fall)) for fall in np.eye(3)]
+        self.patterns = [_nodal_pattern(body, _level_reaction(body, no_load, fall)) for fall in np.eye(3)]
 
     def add(self, motion: Loaded) -> None:
         """Add the force for the motion's body acceleration."""

@@ -121,7 +121,7 @@ def _read_at_once(source: TableColumn, text: str) -> NDArray[np.float64] | None:
         return None
     try:
         titles = [cell.strip() for cell in next(csv.reader(lines[head : head + 1]))]
-        columns = read_header(source, head + 1, titles)
+        columns = _read_header(source, head + 1, titles)
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # a table without rows
             table = np.loadtxt(lines[head + 1 :], delimiter=",", comments="#", ndmin=2)
@@ -137,16 +137,16 @@ def _read_rows(source: TableColumn, text: str) -> NDArray[np.float64]:
     """Return times and values ``(n, 2)`` in SI units, read row by row; raises as ``read_pulse`` at the first error."""
     path, rows = source.path, _content(source.path, text)
     number, row = next(rows, (0, []))
-    columns = read_header(source, number, [cell.strip() for cell in row]) if row else Columns(2, 1, (1.0, 1.0))
+    columns = _read_header(source, number, [cell.strip() for cell in row]) if row else Columns(2, 1, (1.0, 1.0))
     lines, pairs = [], []
     for number, row in rows:
         lines.append(number)
-        pairs.append(read_row(path, number, row, columns))
+        pairs.append(_read_row(path, number, row, columns))
     if len(pairs) < 2:
         count = len(pairs) + (number > 0)
         raise PulseError(f"{path}: a header and at least two rows are needed, found {count} lines with content")
     table = np.array(pairs)
-    check_times(path, lines, table[:, 0])
+    _check_times(path, lines, table[:, 0])
     return table
 
 
@@ -160,22 +160,22 @@ def _content(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
         raise PulseError(f"{path}: is not a table of comma separated values: {error}") from error
 
 
-def read_header(source: TableColumn, number: int, row: Sequence[str]) -> Columns:
+def _read_header(source: TableColumn, number: int, row: Sequence[str]) -> Columns:
     """Return the columns of a table from the titles in line ``number``; raises as ``read_pulse``."""
     path = source.path
     if len(row) < 2:
         raise PulseError(f"{path}, line {number}: the header must name a column of times and one of values")
-    value = 1 if len(row) == 2 else find_column(path, number, row, source.title)
-    scales = read_unit(path, number, row[0], TIMES), read_unit(path, number, row[value], QUANTITIES[source.quantity])
+    value = 1 if len(row) == 2 else _find_column(path, number, row, source.title)
+    scales = _read_unit(path, number, row[0], TIMES), _read_unit(path, number, row[value], QUANTITIES[source.quantity])
     return Columns(len(row), value, scales)
 
 
-def find_column(path: Path, number: int, row: Sequence[str], column: str | None) -> int:
+def _find_column(path: Path, number: int, row: Sequence[str], column: str | None) -> int:
     """Return the index of the column with a title, with or without its unit; raises as ``read_pulse``."""
     titles, line = row[1:], f"{path}, line {number}"
     if column is None:
         raise PulseError(f"{line}: has several columns of values, {_listed(titles)}: name one of them as table_column")
-    matches = [k for k, title in enumerate(row) if k and column in (title, split_title(title)[0])]
+    matches = [k for k, title in enumerate(row) if k and column in (title, _split_title(title)[0])]
     if len(matches) != 1:
         near = get_close_matches(column, titles, n=1)
         hint = f"; did you mean {near[0]!r}?" if near else ""
@@ -184,29 +184,29 @@ def find_column(path: Path, number: int, row: Sequence[str], column: str | None)
 
 
 def _listed(titles: Sequence[str]) -> str:
-    return abbreviate(", ".join(titles))
+    return _abbreviate(", ".join(titles))
 
 
-def split_title(title: str) -> tuple[str, str]:
+def _split_title(title: str) -> tuple[str, str]:
     """Return name and unit of a column titled ``name [unit]``, ``name (unit)`` or ``name_unit``; unit "" if none."""
     match = re.search(r"^(.*?)\s*(?:[\[(]\s*([^\])]+?)\s*[\])]|_([A-Za-z]+))$", title)
     return (match.group(1), match.group(2) or match.group(3)) if match else (title, "")
 
 
-def read_unit(path: Path, number: int, title: str, units: dict[str, float]) -> float:
+def _read_unit(path: Path, number: int, title: str, units: dict[str, float]) -> float:
     """Return the factor to SI of the unit in a column title; raises as ``read_pulse``."""
-    unit = split_title(title)[1]
+    unit = _split_title(title)[1]
     if unit not in units:
         near = get_close_matches(unit, units, n=1, cutoff=0.3)
         hint = f"; did you mean [{near[0]}]?" if near else ""
         raise PulseError(
-            f"{path}, line {number}: column {abbreviate(title)!r} needs its unit in brackets, "
+            f"{path}, line {number}: column {_abbreviate(title)!r} needs its unit in brackets, "
             f"one of {', '.join(units)}{hint}"
         )
     return units[unit]
 
 
-def read_row(path: Path, number: int, row: Sequence[str], columns: Columns) -> tuple[float, float]:
+def _read_row(path: Path, number: int, row: Sequence[str], columns: Columns) -> tuple[float, float]:
     """Return time and value of a row in SI units; raises as ``read_pulse``."""
     try:
         if len(row) != columns.count:
@@ -214,14 +214,14 @@ def read_row(path: Path, number: int, row: Sequence[str], columns: Columns) -> t
         time, value = (float(row[k]) * scale for k, scale in zip((0, columns.value), columns.scales, strict=True))
     except ValueError:
         count = "two" if columns.count == 2 else columns.count
-        cells = abbreviate(", ".join(row))
+        cells = _abbreviate(", ".join(row))
         raise PulseError(f"{path}, line {number}: {count} numbers are needed, found {cells}") from None
     if not (math.isfinite(time) and math.isfinite(value)):
-        raise PulseError(f"{path}, line {number}: {abbreviate(', '.join(row))} is not finite")
+        raise PulseError(f"{path}, line {number}: {_abbreviate(', '.join(row))} is not finite")
     return time, value
 
 
-def check_times(path: Path, lines: Sequence[int], times: np.ndarray) -> None:
+def _check_times(path: Path, lines: Sequence[int], times: np.ndarray) -> None:
     """Check that times ``(n,)`` [s] increase; raises as ``read_pulse``, with the line of the first that does not."""
     wrong = np.flatnonzero(np.diff(times) <= 0.0)
     if len(wrong):
@@ -229,6 +229,6 @@ def check_times(path: Path, lines: Sequence[int], times: np.ndarray) -> None:
         raise PulseError(f"{path}, line {lines[k + 1]}: times must increase, {times[k + 1]:g} s follows {times[k]:g} s")
 
 
-def abbreviate(text: str) -> str:
+def _abbreviate(text: str) -> str:
     """Return a text cut to ``LONGEST`` characters with an ellipsis."""
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"

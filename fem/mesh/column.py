@@ -38,15 +38,15 @@ def insert_columns(mesh: MeshData) -> MeshData:
     columns = [mesh.part_names[part] for part in np.unique(mesh.part) if COLUMN in mesh.part_names[part]]
     if not columns:
         return mesh
-    places = {name: boxes_in_place(mesh, name) for name in columns}
-    walls = shared_facets(mesh.cells, np.any(list(places.values()), axis=0))
-    mesh, gone = name_coarse_copies(mesh, places)
+    places = {name: _boxes_in_place(mesh, name) for name in columns}
+    walls = _shared_facets(mesh.cells, np.any(list(places.values()), axis=0))
+    mesh, gone = _name_coarse_copies(mesh, places)
     mesh, number = selected_cells(mesh, ~gone)
-    mesh, merged = merge_neighbours(drop_stale_facets(mesh))
-    return name_faces(mesh, merged[number[walls]])
+    mesh, merged = _merge_neighbours(drop_stale_facets(mesh))
+    return _name_faces(mesh, merged[number[walls]])
 
 
-def boxes_in_place(mesh: MeshData, column: str) -> NDArray[np.bool_]:
+def _boxes_in_place(mesh: MeshData, column: str) -> NDArray[np.bool_]:
     """Return whether a column replaces each cell of the mesh, shape (ne,); errors as in ``insert_columns``."""
     role, in_column = role_of_part(column), mesh.in_parts(column.__eq__)
     box = mesh.in_parts(lambda name: "@" not in name and role_of_part(name) == role)
@@ -62,7 +62,7 @@ def boxes_in_place(mesh: MeshData, column: str) -> NDArray[np.bool_]:
     return inside
 
 
-def name_coarse_copies(mesh: MeshData, places: Mapping[str, NDArray[np.bool_]]) -> tuple[MeshData, NDArray[np.bool_]]:
+def _name_coarse_copies(mesh: MeshData, places: Mapping[str, NDArray[np.bool_]]) -> tuple[MeshData, NDArray[np.bool_]]:
     """Rename the boxes in place of columns that a driving model keeps under coarse copies of joints.
 
     Args:
@@ -83,7 +83,7 @@ def name_coarse_copies(mesh: MeshData, places: Mapping[str, NDArray[np.bool_]]) 
     return replace(mesh, part=part, part_names=tuple(names)), gone
 
 
-def shared_facets(cells: NDArray[np.int32], gone: NDArray[np.bool_]) -> NDArray[np.int32]:
+def _shared_facets(cells: NDArray[np.int32], gone: NDArray[np.bool_]) -> NDArray[np.int32]:
     """Return the facets between removed cells (mask of shape (ne,)) and the others, in cyclic order, shape (nf, 4)."""
     facets = boundary_facets(cells[gone])
     return facets[cells_of_facets(cells[~gone], facets) >= 0][:, CYCLIC]
@@ -97,7 +97,7 @@ def drop_stale_facets(mesh: MeshData) -> MeshData:
     return replace(mesh, facets={name: facets[valid] for (name, facets), valid in sets})
 
 
-def merge_neighbours(mesh: MeshData) -> tuple[MeshData, NDArray[np.int32]]:
+def _merge_neighbours(mesh: MeshData) -> tuple[MeshData, NDArray[np.int32]]:
     """Merge the nodes on common faces of neighbouring columns; returns as ``merge_nodes``."""
     faces = [np.unique(some) for name, some in mesh.facets.items() if name.startswith(FACES) and len(some)]
     nodes = np.unique(np.concatenate(faces))
@@ -109,7 +109,7 @@ def merge_neighbours(mesh: MeshData) -> tuple[MeshData, NDArray[np.int32]]:
     return merge_nodes(mesh, nodes[twice], nodes[first[twice]])
 
 
-def name_faces(mesh: MeshData, walls: NDArray[np.int32]) -> MeshData:
+def _name_faces(mesh: MeshData, walls: NDArray[np.int32]) -> MeshData:
     """Assign the faces of columns to ties, planes of symmetry or the free surface.
 
     Args:
@@ -122,19 +122,19 @@ def name_faces(mesh: MeshData, walls: NDArray[np.int32]) -> MeshData:
     outer = np.sort(boundary_facets(mesh.cells), axis=1)
     sets = {name: some for name, some in mesh.facets.items() if name.startswith(FACES)}
     faces, column = np.concatenate(list(sets.values())), np.repeat(list(sets), [len(some) for some in sets.values()])
-    outside = are_among(np.sort(faces, axis=1), outer)
+    outside = _are_among(np.sort(faces, axis=1), outer)
     faces, column = faces[outside], column[outside]
     corners = mesh.points[faces]
     for axis, plane in enumerate(SYMMETRY):
         if len(mesh.facets_of(plane)):
             flat = (np.abs(corners[:, :, axis]) < SAME * np.ptp(corners)).all(axis=1)
             facets[plane] = np.concatenate([facets[plane], faces[flat]])
-    tied = lie_on_walls(corners, mesh.points[walls])
-    check_neighbours(corners[~tied], column[~tied])
+    tied = _lie_on_walls(corners, mesh.points[walls])
+    _check_neighbours(corners[~tied], column[~tied])
     return replace(mesh, facets=facets | {SLAVES: faces[tied], MASTERS: walls})
 
 
-def check_neighbours(corners: NDArray[np.float64], column: NDArray[np.str_]) -> None:
+def _check_neighbours(corners: NDArray[np.float64], column: NDArray[np.str_]) -> None:
     """Check that neighbouring columns share the nodes of their common face.
 
     Args:
@@ -150,7 +150,7 @@ def check_neighbours(corners: NDArray[np.float64], column: NDArray[np.str_]) -> 
         low, high = corners[in_column].min(axis=(0, 1)), corners[in_column].max(axis=(0, 1))
         slack = TOLERANCE * (high - low).max()
         near = ~in_column & ((centre > low - slack) & (centre < high + slack)).all(axis=1)
-        if not near.any() or not (met := lie_on_walls(corners[in_column], corners[near])).any():
+        if not near.any() or not (met := _lie_on_walls(corners[in_column], corners[near])).any():
             continue
         middle = centre[in_column][met][:1]
         other = column[near][closest_facets(middle, corners[near])[0][0]]
@@ -162,13 +162,13 @@ def check_neighbours(corners: NDArray[np.float64], column: NDArray[np.str_]) -> 
         )
 
 
-def are_among(facets: NDArray[np.int32], outer: NDArray[np.int32]) -> NDArray[np.bool_]:
+def _are_among(facets: NDArray[np.int32], outer: NDArray[np.int32]) -> NDArray[np.bool_]:
     """Return whether each facet (nf, 4) is among other facets, shape (nf,); the nodes of each must be sorted."""
     _, first, index = np.unique(np.concatenate([outer, facets]), axis=0, return_index=True, return_inverse=True)
     return first[index.reshape(-1)[len(outer) :]] < len(outer)
 
 
-def lie_on_walls(corners: NDArray[np.float64], walls: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _lie_on_walls(corners: NDArray[np.float64], walls: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return whether all corners of each facet (nf, 4, 3) lie on walls (nw, 4, 3), shape (nf,)."""
     facet, _, distance = closest_facets(corners.reshape(-1, 3), walls)
     size = np.linalg.norm(np.ptp(walls[facet], axis=1), axis=1)

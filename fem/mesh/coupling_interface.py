@@ -24,7 +24,7 @@ def find_interface(mesh: MeshData) -> tuple[NDArray[np.int32], NDArray[np.int32]
     board, patch = mesh.cells[mesh.in_parts(MACRO.__eq__)], mesh.cells[mesh.in_parts(PATCH.__eq__)]
     if not len(board) or not len(patch):
         return np.empty(0, np.int32), np.empty(0, np.int32)
-    facets = inner_facets(mesh.points, board, patch)
+    facets = _inner_facets(mesh.points, board, patch)
     meso = np.unique(facets).astype(np.int32)
     edges = mesh.points[facets[:, [1, 2]]] - mesh.points[facets[:, [0, 0]]]
     tolerance = MATCH * float(np.linalg.norm(edges, axis=2).min())
@@ -39,7 +39,7 @@ def find_interface(mesh: MeshData) -> tuple[NDArray[np.int32], NDArray[np.int32]
     return candidates[nearest], meso
 
 
-def inner_facets(points: NDArray[np.float64], board: NDArray[np.int32], patch: NDArray[np.int32]) -> NDArray[np.int32]:
+def _inner_facets(points: NDArray[np.float64], board: NDArray[np.int32], patch: NDArray[np.int32]) -> NDArray[np.int32]:
     """Return the boundary facets of the patch that do not lie on the bounding box of board and patch, shape (nf, 4).
 
     Raises:

@@ -25,18 +25,18 @@ class FacetRule:
     weights: NDArray[np.float64]
 
 
-def quadrilateral() -> FacetRule:
+def _quadrilateral() -> FacetRule:
     """Return the 2 x 2 Gauss rule of a bilinear quadrilateral."""
     factors = 1.0 + GAUSS[:, None, :] * CYCLIC
     return FacetRule(0.25 * factors.prod(axis=2), 0.25 * CYCLIC * factors[:, :, ::-1], np.ones(4))
 
 
 def triangle() -> FacetRule:
-    """Return the centroid rule of a linear triangle."""
+    """Return the one-point (centroid) quadrature rule of a linear triangle."""
     return FacetRule(np.full((1, 3), 1.0 / 3.0), BARYCENTRIC[None], np.full(1, 0.5))
 
 
-def quadratic_triangle() -> FacetRule:
+def _quadratic_triangle() -> FacetRule:
     """Return the midpoint-of-edges rule of a quadratic triangle, exact for quadratic integrands."""
     at = 0.5 * (np.eye(3) + np.roll(np.eye(3), 1, axis=1))  # on ab, bc, ca
     vertices = (4.0 * at - 1.0)[:, :, None] * BARYCENTRIC
@@ -46,14 +46,14 @@ def quadratic_triangle() -> FacetRule:
     return FacetRule(values, np.concatenate([vertices, edges], axis=1), np.full(3, 1.0 / 6.0))
 
 
-def middles_of_edges() -> FacetRule:
+def _middles_of_edges() -> FacetRule:
     """Return the midpoint-of-edges rule of a linear triangle, exact for products of its shape functions."""
     at = 0.5 * (np.eye(3) + np.roll(np.eye(3), 1, axis=1))
     return FacetRule(at, np.tile(BARYCENTRIC, (3, 1, 1)), np.full(3, 1.0 / 6.0))
 
 
-RULES = {4: quadrilateral(), 3: triangle(), 6: quadratic_triangle()}
-PRODUCTS = RULES | {3: middles_of_edges()}
+RULES = {4: _quadrilateral(), 3: triangle(), 6: _quadratic_triangle()}
+PRODUCTS = RULES | {3: _middles_of_edges()}
 
 
 def area_vectors(corners: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -66,7 +66,7 @@ def area_vectors(corners: NDArray[np.float64]) -> NDArray[np.float64]:
             the right-hand rule.
     """
     rule = RULES[corners.shape[1]]
-    return np.einsum("q,qa,fqi->fai", rule.weights, rule.values, normals(corners, rule))
+    return np.einsum("q,qa,fqi->fai", rule.weights, rule.values, _normals(corners, rule))
 
 
 def bedding_matrices(corners: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -78,7 +78,7 @@ def bedding_matrices(corners: NDArray[np.float64]) -> NDArray[np.float64]:
         corners: Node coordinates of the facets, shape (nf, m, 3) [m].
     """
     rule = PRODUCTS[corners.shape[1]]
-    area = np.linalg.norm(normals(corners, rule), axis=2)
+    area = np.linalg.norm(_normals(corners, rule), axis=2)
     return np.einsum("q,qa,qb,fq->fab", rule.weights, rule.values, rule.values, area)
 
 
@@ -107,7 +107,7 @@ def spring_rates(
     return np.asarray(stiffness.max() * (largest / np.take_along_axis(mass, at_facet, axis=1)).max(axis=1))
 
 
-def normals(corners: NDArray[np.float64], rule: FacetRule) -> NDArray[np.float64]:
+def _normals(corners: NDArray[np.float64], rule: FacetRule) -> NDArray[np.float64]:
     """Return the normals of facets at the points of a rule, scaled by the Jacobian, shape (nf, q, 3) [m^2]."""
     tangent = np.einsum("fai,qad->fqid", corners, rule.derivatives)
     return np.cross(tangent[..., 0], tangent[..., 1])

@@ -13,16 +13,16 @@ from reflowshock.fem.mesh.mesh import MeshData, cells_of_facets
 
 
 def facet_set(mesh: MeshData, name: str) -> NDArray[np.int32]:
-    """Return the facets of a set, shape (nf, m).
+    """Return the node numbers of the facets of a set, shape (nf, m), in the order of ``MeshData.facets``.
 
     Raises:
         LoadError: The mesh has no such set, or it is empty.
     """
-    check_facet_set(mesh.facets, name)
+    _check_facet_set(mesh.facets, name)
     return mesh.facets[name]
 
 
-def check_facet_set(facets: Mapping[str, Sequence] | Mapping[str, NDArray], name: str) -> None:
+def _check_facet_set(facets: Mapping[str, Sequence] | Mapping[str, NDArray], name: str) -> None:
     """Check that a facet set exists and is not empty.
 
     Raises:

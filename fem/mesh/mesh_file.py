@@ -25,7 +25,7 @@ MIDDLE[EDGES[:, 0], EDGES[:, 1]] = MIDDLE[EDGES[:, 1], EDGES[:, 0]] = 4 + np.ara
 
 
 def read_meshes(paths: Sequence[Path]) -> MeshData:
-    """Read Gmsh files and concatenate them into one mesh without merging nodes."""
+    """Read Gmsh files and concatenate them into one mesh without merging nodes; raises as ``read_mesh``, ``append``."""
     return append([read_mesh(path) for path in paths])
 
 
@@ -34,15 +34,15 @@ def read_mesh(path: Path) -> MeshData:
 
     Raises:
         MeshError: The file has no cells of a supported shape, several shapes, a cell in no or several volumes, or a
-            cell that is too distorted (``check_quality``).
+            cell that is too distorted (``_check_quality``).
     """
     import meshio
 
     mesh = meshio.read(path, file_format="gmsh")
-    shape = shape_in_file(mesh, path)
+    shape = _shape_in_file(mesh, path)
     blocks = [index for index, block in enumerate(mesh.cells) if block.type == shape.name]
     names = tuple(name for name, (_, dimension) in mesh.field_data.items() if dimension == 3)
-    part = np.concatenate([part_of_block(mesh, index, names, path) for index in blocks])
+    part = np.concatenate([_part_of_block(mesh, index, names, path) for index in blocks])
     cells = np.concatenate([mesh.cells[index].data for index in blocks])[:, shape.order]
     faces = [index for index, block in enumerate(mesh.cells) if block.type == shape.facet]
     facets = {
@@ -52,11 +52,11 @@ def read_mesh(path: Path) -> MeshData:
     }
     points = np.ascontiguousarray(mesh.points, float)
     data = MeshData(points, cells.astype(np.int32), part.astype(np.int32), names, facets)
-    check_quality(data)
+    _check_quality(data)
     return without_unused_nodes(data)[0]
 
 
-def shape_in_file(mesh: "meshio.Mesh", path: Path) -> CellShape:
+def _shape_in_file(mesh: "meshio.Mesh", path: Path) -> CellShape:
     """Return the one shape of the cells in a file; see ``read_mesh`` for the errors."""
     types = {block.type for block in mesh.cells if block.dim == 3}
     supported = {shape.name: shape for shape in SHAPES.values()}
@@ -66,7 +66,7 @@ def shape_in_file(mesh: "meshio.Mesh", path: Path) -> CellShape:
     return supported[types.pop()]
 
 
-def part_of_block(mesh: "meshio.Mesh", index: int, names: tuple[str, ...], path: Path) -> NDArray[np.int64]:
+def _part_of_block(mesh: "meshio.Mesh", index: int, names: tuple[str, ...], path: Path) -> NDArray[np.int64]:
     """Return the part of each cell of one block; see ``read_mesh`` for the errors."""
     owners = [k for k, name in enumerate(names) if len(mesh.cell_sets[name][index])]
     if len(owners) != 1:
@@ -97,7 +97,7 @@ def scaled_jacobians(corners: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.divide(spanned, lengths, out=np.zeros_like(spanned), where=lengths > 0.0).min(axis=1)
 
 
-def check_quality(mesh: MeshData) -> None:
+def _check_quality(mesh: MeshData) -> None:
     """Check that the scaled Jacobian of every cell is large enough for an element.
 
     Raises:

@@ -69,13 +69,13 @@ def pad_faces(mesh: MeshData, joints: tuple[str, ...], solder: list[NDArray[np.i
     Args:
         mesh: Whole mesh.
         joints: Names of the joints.
-        solder: Solder elements of each joint.
+        solder: Numbers of the solder elements of each joint, one array per joint in the order of ``joints``.
 
     Raises:
         MeshError: A facet of a pad belongs to no solder element of its joint, or a pad has no facet.
     """
     faces = [
-        pad_face(mesh, f"pad_{end}@{name}", cells, (1.0, -1.0)[ENDS.index(end)])
+        _pad_face(mesh, f"pad_{end}@{name}", cells, (1.0, -1.0)[ENDS.index(end)])
         for end in ENDS
         for name, cells in zip(joints, solder, strict=True)
     ]
@@ -96,7 +96,7 @@ def pad_faces(mesh: MeshData, joints: tuple[str, ...], solder: list[NDArray[np.i
     )
 
 
-def pad_face(mesh: MeshData, name: str, solder: NDArray[np.intp], inward: float) -> tuple[Any, ...]:
+def _pad_face(mesh: MeshData, name: str, solder: NDArray[np.intp], inward: float) -> tuple[Any, ...]:
     """Return nodes, adjacent cells, facets, their cells and signs, and (centre, frame, area, modulus) of one face."""
     facets = mesh.facets_of(name)
     owner = cells_of_facets(mesh.cells[solder], facets)

@@ -33,11 +33,11 @@ def point_shares(
         LoadError: The point lies outside the mesh.
     """
     at = np.array(position)
-    corners = mesh.points[mesh.cells[:, : vertices(mesh)]]
+    corners = mesh.points[mesh.cells[:, : _vertices(mesh)]]
     low, high = corners.min(axis=1), corners.max(axis=1)
     margin = ROUNDING * (high - low)
     near = np.flatnonzero(((low - margin <= at) & (at <= high + margin)).all(axis=1))
-    shares = (trilinear if mesh.shape is HEXAHEDRON else barycentric)(corners[near], at)
+    shares = (_trilinear if mesh.shape is HEXAHEDRON else _barycentric)(corners[near], at)
     least = shares.min(axis=1)  # negative outside
     if not (least >= -ROUNDING).any():
         distance = np.linalg.norm(mesh.points - at, axis=1)
@@ -50,19 +50,19 @@ def point_shares(
     return mesh.cells[near[best], : corners.shape[1]].astype(np.int64), shares[best]
 
 
-def vertices(mesh: MeshData) -> int:
+def _vertices(mesh: MeshData) -> int:
     """Return the number of vertices of a cell, which are its first nodes."""
     return 8 if mesh.shape is HEXAHEDRON else 4
 
 
-def barycentric(corners: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
+def _barycentric(corners: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the barycentric coordinates of a point (3,) [m] in tetrahedra (m, 4, 3) [m], shape (m, 4)."""
     edges = np.moveaxis(corners[:, 1:] - corners[:, :1], 1, 2)
     others = np.linalg.solve(edges, (at - corners[:, 0])[:, :, None])[:, :, 0]
     return np.column_stack([1.0 - others.sum(axis=1), others])
 
 
-def trilinear(corners: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
+def _trilinear(corners: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the shape functions of hexahedra (m, 8, 3) [m] at a point (3,) [m] by Newton iteration, shape (m, 8)."""
     xi = np.zeros((len(corners), 3))
     for _ in range(NEWTON_STEPS):

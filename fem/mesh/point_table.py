@@ -93,7 +93,7 @@ def point_table(
     Raises:
         MeshError: A point lies outside the mesh.
     """
-    nodes = np.array([nearest_node(mesh, name, np.array(position)) for name, position in positions.items()], np.int64)
+    nodes = np.array([_nearest_node(mesh, name, np.array(position)) for name, position in positions.items()], np.int64)
     patches = [patch(mesh, int(node)) for node in nodes]
     centres = [mesh.points[mesh.cells[cells]].mean(axis=1) for cells in patches]
     touching = [int((mesh.cells[cells] == node).any(axis=1).sum()) for cells, node in zip(patches, nodes, strict=True)]
@@ -115,7 +115,7 @@ def point_table(
     )
 
 
-def nearest_node(mesh: MeshData, name: str, position: NDArray[np.float64]) -> int:
+def _nearest_node(mesh: MeshData, name: str, position: NDArray[np.float64]) -> int:
     """Return the node nearest to a position (3,) [m]; errors as in ``point_table``."""
     distance = np.linalg.norm(mesh.points - position, axis=1)
     node = int(np.argmin(distance))

@@ -79,7 +79,7 @@ def tie_joints(mesh: MeshData) -> tuple[MeshData, Tie, float]:
     ends = [(name, name.replace("slave@", "master@", 1)) for name in mesh.facets if name.startswith("slave@")]
     ends += [(name, "board_side") for name in mesh.facets if name.startswith("foot@")]
     ends += [(name, "package_side") for name in mesh.facets if name.startswith("head@")]
-    ties = [tie_end(mesh, end, side) for end, side in ends if len(mesh.facets[end])]
+    ties = [_tie_end(mesh, end, side) for end, side in ends if len(mesh.facets[end])]
     if not ties:
         return mesh, Tie.none(), 0.0
     tie = Tie(*(np.concatenate([getattr(item, name) for item in ties]) for name in ("slave", "master", "weight")))
@@ -95,7 +95,7 @@ def tie_joints(mesh: MeshData) -> tuple[MeshData, Tie, float]:
     return replace(mesh, points=points), tie, moved
 
 
-def tie_end(mesh: MeshData, end: str, side: str) -> Tie:
+def _tie_end(mesh: MeshData, end: str, side: str) -> Tie:
     """Tie the nodes of one end of a joint to the facets of a side; errors as ``tie_joints``."""
     facets = mesh.facets_of(side)
     if not len(facets):
@@ -118,7 +118,7 @@ def bilinear(xi: NDArray[np.float64]) -> NDArray[np.float64]:
     return 0.25 * np.prod(1.0 + xi[:, None, :] * CORNERS, axis=2)
 
 
-def bilinear_derivatives(xi: NDArray[np.float64]) -> NDArray[np.float64]:
+def _bilinear_derivatives(xi: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the derivatives of the shape functions of a quadrilateral at xi (m, 2), shape (m, 4, 2)."""
     return 0.25 * CORNERS * (1.0 + xi[:, None, ::-1] * CORNERS[:, ::-1])
 
@@ -154,7 +154,7 @@ def project(
     xi = np.zeros((len(points), 2))
     for _ in range(NEWTON_STEPS):
         residual = points - np.einsum("ma,mai->mi", bilinear(xi), corners)
-        tangent = np.einsum("mad,mai->mid", bilinear_derivatives(xi), corners)
+        tangent = np.einsum("mad,mai->mid", _bilinear_derivatives(xi), corners)
         normal = np.einsum("mid,mie->mde", tangent, tangent)
         normal += SINGULAR * np.trace(normal, axis1=1, axis2=2)[:, None, None] * np.eye(2)
         step = np.linalg.solve(normal, np.einsum("mid,mi->md", tangent, residual)[:, :, None])[:, :, 0]

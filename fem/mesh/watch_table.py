@@ -69,7 +69,7 @@ def joint_names(mesh: MeshData) -> tuple[str, ...]:
     return tuple(name.split("@")[1] for name in mesh.part_names if name.startswith("solder@"))
 
 
-def footprint(mesh: MeshData) -> NDArray[np.float64]:
+def _footprint(mesh: MeshData) -> NDArray[np.float64]:
     """Return the lower and upper corner in plan of the board patch, or of the mesh if it has none, (2, 2) [m]."""
     patch = mesh.in_parts("board_patch".__eq__)
     points = mesh.points[mesh.cells[patch if patch.any() else slice(None)]][:, :, :2]
@@ -77,16 +77,19 @@ def footprint(mesh: MeshData) -> NDArray[np.float64]:
 
 
 def centre_nodes(mesh: MeshData) -> NDArray[np.int64]:
-    """Return the nodes nearest to the axis x = y = 0 on the board's lower face and on the die's upper face, or -1."""
+    """Return the nodes nearest to the axis x = y = 0 on the board's lower face and the die's upper face, shape (2,).
+
+    A node is -1 if the mesh has no such part.
+    """
     board = mesh.facet_nodes("board_bottom")
     die = np.unique(mesh.cells[mesh.in_parts("die".__eq__)])
     if len(die):
         height = mesh.points[die, 2]
         die = die[height > height.max() - 1e-6 * np.ptp(mesh.points[die], axis=0).max()]
-    return np.array([nearest_to_axis(mesh.points, nodes) for nodes in (board, die)])
+    return np.array([_nearest_to_axis(mesh.points, nodes) for nodes in (board, die)])
 
 
-def nearest_to_axis(points: NDArray[np.float64], nodes: NDArray[np.integer]) -> int:
+def _nearest_to_axis(points: NDArray[np.float64], nodes: NDArray[np.integer]) -> int:
     """Return the node nearest to the axis x = y = 0, or -1 if ``nodes`` is empty."""
     return int(nodes[np.argmin(np.sum(points[nodes, :2] ** 2, axis=1))]) if len(nodes) else -1
 
@@ -105,13 +108,13 @@ def whole_watch(mesh: MeshData, thickness: float) -> WatchTable:
     solder = [mesh.in_parts(f"solder@{name}".__eq__).nonzero()[0] for name in joints]
     faces = pad_faces(mesh, joints, solder)
     facets = mesh.facets_of("board_bottom")
-    low, high = footprint(mesh)
+    low, high = _footprint(mesh)
     facets = facets[((mesh.points[facets][:, :, :2] >= low) & (mesh.points[facets][:, :, :2] <= high)).all(axis=(1, 2))]
     return WatchTable(
         joints=joints,
         centres=centre_nodes(mesh),
         faces=faces,
-        layer=pad_layers(mesh, joints, solder, faces, thickness),
+        layer=_pad_layers(mesh, joints, solder, faces, thickness),
         thickness=thickness,
         solder_cells=np.concatenate([*solder, np.empty(0, np.int64)]),
         solder_joint=np.repeat(np.arange(len(joints)), [len(cells) for cells in solder]),
@@ -120,7 +123,7 @@ def whole_watch(mesh: MeshData, thickness: float) -> WatchTable:
     )
 
 
-def pad_layers(
+def _pad_layers(
     mesh: MeshData, joints: tuple[str, ...], solder: list[NDArray[np.intp]], faces: PadFaces, thickness: float
 ) -> PadLayer:
     """Return the solder within a distance ``thickness`` [m] of the pads; errors as in ``whole_watch``."""

@@ -50,11 +50,11 @@ def compare_histories(two_scale: Path, dns: Path, fine: Collection[str] | None =
     if count < len(ours["time"]):
         result["compared_duration"] = float(reference["time"][-1])
     if len(reference["joints"]):
-        result |= joint_errors(ours, reference, fine)
+        result |= _joint_errors(ours, reference, fine)
     return result
 
 
-def joint_errors(
+def _joint_errors(
     ours: dict[str, NDArray], reference: dict[str, NDArray], fine: Collection[str] | None
 ) -> dict[str, float | str]:
     """Return the errors of the joint histories, with board and package side combined."""

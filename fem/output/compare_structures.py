@@ -39,7 +39,7 @@ def solver_differences(ours: Arrays, reference: Arrays) -> dict[str, float]:
     result: dict[str, float] = {}
     for quantity in COMPARED if names else ():
         pairs = {
-            name: tuple(at_times(times, arrays["time"], arrays[f"{quantity}@{name}"]) for arrays in (ours, reference))
+            name: tuple(_at_times(times, arrays["time"], arrays[f"{quantity}@{name}"]) for arrays in (ours, reference))
             for name in names
         }
         result |= {f"{quantity}_difference@{name}": relative_error(*pair) for name, pair in pairs.items()}
@@ -48,7 +48,7 @@ def solver_differences(ours: Arrays, reference: Arrays) -> dict[str, float]:
     return result
 
 
-def at_times(
+def _at_times(
     times: NDArray[np.float64], sampled: NDArray[np.float64], values: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Interpolate values, shape (len(sampled), k), to other times by cubic splines, unless the times agree."""

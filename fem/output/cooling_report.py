@@ -71,8 +71,8 @@ def write_cooling(
     """
     body, tables = model.body, model.tables
     yields = request.materials.solder.plasticity is not None
-    joints = joint_row(world, body, tables, yields)
-    cells = world.gather((body.local.cell_numbers, cell_fields(body, yields)))
+    joints = _joint_row(world, body, tables, yields)
+    cells = world.gather((body.local.cell_numbers, _cell_fields(body, yields)))
     if cooled is None or cells is None:
         return
     whole, cooling = cooled.whole, cooled.cooling
@@ -81,9 +81,9 @@ def write_cooling(
     for numbers, values in cells:
         for name, field in fields.items():
             field[numbers] = values[name]
-    write_fields(whole.mesh, cooling, fields, request)
+    _write_fields(whole.mesh, cooling, fields, request)
     record = {
-        "metrics": metrics(whole.mesh, cooling, joints, convergence),
+        "metrics": _metrics(whole.mesh, cooling, joints, convergence),
         "health": make_checks(
             {
                 "cooling_force_residual": (convergence.residuals[-1], CONVERGED),
@@ -97,7 +97,7 @@ def write_cooling(
     (request.output / "result.json").write_text(json.dumps(record, indent=1), encoding="utf-8")
 
 
-def joint_row(world: MPI.Comm, body: Body, tables: JointTables, yields: bool) -> dict[str, NDArray]:
+def _joint_row(world: MPI.Comm, body: Body, tables: JointTables, yields: bool) -> dict[str, NDArray]:
     """Return names, stresses [Pa] and plastic strain of the joints; collective."""
     watch = JointWatch(tables, body, yields)
     sums, maxima = watch.sample(explicit_motion(body, [], 1.0))
@@ -110,7 +110,7 @@ def joint_row(world: MPI.Comm, body: Body, tables: JointTables, yields: bool) ->
     return labels | {name: np.asarray(row[name]) for name in columns}
 
 
-def cell_fields(body: Body, yields: bool) -> dict[str, NDArray[np.float64]]:
+def _cell_fields(body: Body, yields: bool) -> dict[str, NDArray[np.float64]]:
     """Return residual von Mises stress [Pa] and plastic strain of this rank's elements."""
     recovery = StressRecovery(body, np.arange(len(body.elements.cells)))
     rest = np.zeros((len(body.mass), 3))
@@ -118,7 +118,7 @@ def cell_fields(body: Body, yields: bool) -> dict[str, NDArray[np.float64]]:
     return fields | ({"plastic_strain": recovery.plastic_strain()} if yields else {})
 
 
-def write_fields(
+def _write_fields(
     mesh: MeshData, cooling: Cooling, fields: dict[str, NDArray[np.float64]], request: CoolingInput
 ) -> None:
     """Write ``residual.vtu`` with the displacement since solidification [m] and the fields of the cells."""
@@ -129,14 +129,14 @@ def write_fields(
     meshio.Mesh(mesh.points, cells, {"displacement": cooling.displacement}, data).write(request.output / "residual.vtu")
 
 
-def metrics(mesh: MeshData, cooling: Cooling, joints: dict[str, NDArray], convergence: Convergence) -> dict[str, Any]:
+def _metrics(mesh: MeshData, cooling: Cooling, joints: dict[str, NDArray], convergence: Convergence) -> dict[str, Any]:
     """Return the metrics of cooling: warpage, convergence, cost and residual stress."""
     stress = np.maximum(*(joints[name] for name in STRESSES))
     worst = int(np.argmax(stress)) if len(stress) else 0
-    lift = corner_lift(mesh, mesh.points[:, 2])
+    lift = _corner_lift(mesh, mesh.points[:, 2])
     values = {
         "solidified_warpage": quantity(lift, "m"),
-        "room_temperature_warpage": quantity(lift + corner_lift(mesh, cooling.displacement[:, 2]), "m"),
+        "room_temperature_warpage": quantity(lift + _corner_lift(mesh, cooling.displacement[:, 2]), "m"),
         "cooling_iterations": quantity(len(convergence.residuals)),
         "cooling_products": quantity(convergence.products),
         "cooling_force_residual": quantity(convergence.residuals[-1]),
@@ -154,7 +154,7 @@ def metrics(mesh: MeshData, cooling: Cooling, joints: dict[str, NDArray], conver
     return values if plastic is None else values | {"residual_plastic_strain": quantity(float(plastic.max()))}
 
 
-def corner_lift(mesh: MeshData, height: NDArray[np.float64]) -> float:
+def _corner_lift(mesh: MeshData, height: NDArray[np.float64]) -> float:
     """Return the mean height of the package corners above its centre [m], from nodal heights, shape (n,)."""
     nodes = mesh.facet_nodes("package_side")
     if not len(nodes):

@@ -95,24 +95,24 @@ class JointSections:
         points = self._points + motion.displacement if self._finite else self._points
         pad_mass, solder = self._pad_mass, self._solder
         pad_forces = -internal[pad_mass.nodes] + pad_mass.mass[:, None] * inertial[pad_mass.nodes]
-        sections = loads(points, pad_mass, pad_forces, self._faces.centre)
-        inertia = loads(points, solder, solder.mass[:, None] * inertial[solder.nodes], self._middle)
+        sections = _loads(points, pad_mass, pad_forces, self._faces.centre)
+        inertia = _loads(points, solder, solder.mass[:, None] * inertial[solder.nodes], self._middle)
         corners = points[self._facets]
         normal, first, area = facet_sums(corners)
         values = np.column_stack([first, self._facet_sign[:, None] * normal, area])
-        shape = sum_by_slot(self._facet_slot, values, len(self._faces.centre))
+        shape = _sum_by_slot(self._facet_slot, values, len(self._faces.centre))
         return np.concatenate([sections, shape, inertia, self._supported[:, None]], axis=None)
 
 
-def loads(
+def _loads(
     points: NDArray[np.float64], mass: Mass, force: NDArray[np.float64], about: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return force and moment about a point of each slot, shape (slots, 6), of nodal forces, shape (k, 3) [N]."""
     arm = points[mass.nodes] - about[mass.slot]
-    return sum_by_slot(mass.slot, np.column_stack([force, np.cross(arm, force)]), len(about))
+    return _sum_by_slot(mass.slot, np.column_stack([force, np.cross(arm, force)]), len(about))
 
 
-def sum_by_slot(slot: NDArray[np.int64], values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+def _sum_by_slot(slot: NDArray[np.int64], values: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """Return the sums by slot, shape (count, c), of rows of values, shape (k, c)."""
     return np.stack([np.bincount(slot, column, count) for column in values.T], axis=1)
 
@@ -146,10 +146,10 @@ def section_values(sums: NDArray[np.float64], faces: PadFaces) -> dict[str, NDAr
         for name, both in (("section", resultants), ("peel", peel), ("outer_fibre", fibre))
         for end, values in zip(ENDS, np.split(both, 2), strict=True)
     }
-    return ends | {"section_imbalance": np.where(supported > 0.0, 0.0, imbalance(load, inertia, faces.centre))}
+    return ends | {"section_imbalance": np.where(supported > 0.0, 0.0, _imbalance(load, inertia, faces.centre))}
 
 
-def imbalance(
+def _imbalance(
     load: NDArray[np.float64], inertia: NDArray[np.float64], centre: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the difference between the loads of both faces, shape (2 joints, 6), and the joints' inertia [N]."""

@@ -69,41 +69,41 @@ class PackageReport:
         timings: Timings,
     ) -> dict[str, Any]:
         """Return metrics, health checks, effects and coupling."""
-        coupling = coupling_of(self.request, outcome.coupling)
+        coupling = _coupling_of(self.request, outcome.coupling)
         checks = {
             "interface_force_residual": (outcome.history.balance.force_residual, FORCE_RESIDUAL_LIMIT),
-            "section_force_residual": (section_residual(arrays), SECTION_RESIDUAL_LIMIT),
+            "section_force_residual": (_section_residual(arrays), SECTION_RESIDUAL_LIMIT),
         }
         return {
-            "metrics": cost_metrics(summary, updates_a_window(summary, coupling), timings)
-            | health_metrics(outcome.history, arrays)
-            | shock_metrics(arrays)
-            | acceleration_metrics(arrays, self.request)
+            "metrics": _cost_metrics(summary, _updates_a_window(summary, coupling), timings)
+            | _health_metrics(outcome.history, arrays)
+            | _shock_metrics(arrays)
+            | _acceleration_metrics(arrays, self.request)
             | point_metrics(arrays)
             | gauge_metrics(arrays, self.request.shock.filter)
             | mode_metrics(outcome.modes)
-            | response_metrics(outcome.modes, self.request.shock, float(arrays["time"][-1]))
+            | _response_metrics(outcome.modes, self.request.shock, float(arrays["time"][-1]))
             | {"peak_neglected_strain": quantity(outcome.neglected_strain)},
             "health": health(self.request, outcome, checks),
-            "effects": effects(self.request, summary, outcome.neglected_strain),
+            "effects": _effects(self.request, summary, outcome.neglected_strain),
             "coupling": coupling | {"placement": timings.balance},
         }
 
 
-def coupling_of(request: RunInput, coupling: dict[str, Any]) -> dict[str, Any]:
+def _coupling_of(request: RunInput, coupling: dict[str, Any]) -> dict[str, Any]:
     """Return the coupling record of a run; for a DNS only its fine joints."""
     fine = {"fine_joints": request.shock.coupling.fine_joints}
     coupling = coupling | {"direction": request.shock.coupling.direction}
     return fine | coupling if request.mode == "two_scale" else fine
 
 
-def updates_a_window(summary: dict[str, Any], coupling: dict[str, Any]) -> int:
+def _updates_a_window(summary: dict[str, Any], coupling: dict[str, Any]) -> int:
     """Return the number of element updates in a window, with each element counted once per step of its level."""
     levels = coupling.get("levels", [{"elements": sum(summary["elements"].values()), "step": summary["step"]}])
     return sum(level["elements"] * round(summary["window"] / level["step"]) for level in levels)
 
 
-def cost_metrics(summary: dict[str, Any], updates: int, timings: Timings) -> dict[str, Any]:
+def _cost_metrics(summary: dict[str, Any], updates: int, timings: Timings) -> dict[str, Any]:
     """Return the metrics of speed and memory, from the number of element updates in a window."""
     windows, substeps = summary["windows"] - timings.first, summary["substeps"]
     return {
@@ -117,7 +117,7 @@ def cost_metrics(summary: dict[str, Any], updates: int, timings: Timings) -> dic
     }
 
 
-def health_metrics(history: History, arrays: Mapping[str, NDArray]) -> dict[str, Any]:
+def _health_metrics(history: History, arrays: Mapping[str, NDArray]) -> dict[str, Any]:
     """Return residuals, and the difference of both models' interface work over the largest energy."""
     interface = float(np.abs(arrays["interface"]).max())
     return {
@@ -127,17 +127,17 @@ def health_metrics(history: History, arrays: Mapping[str, NDArray]) -> dict[str,
     }
 
 
-def shock_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
+def _shock_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
     """Return the peaks of the histories as metrics."""
     metrics = {
         "simulated_time": quantity(float(arrays["time"][-1]), "s"),
         "peak_board_strain": quantity(float(arrays["board_strain"].max())),
         "peak_board_displacement": quantity(float(np.abs(arrays["board_centre"][:, 2]).max()), "m"),
     }
-    return metrics | joint_metrics(arrays) if len(arrays["joints"]) else metrics
+    return metrics | _joint_metrics(arrays) if len(arrays["joints"]) else metrics
 
 
-def joint_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
+def _joint_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
     """Return peaks over time of the critical joint's worse pad and of all joints, mesh-dependent ones last."""
     critical = critical_joint(arrays)
     sections = np.stack([arrays[f"section_{end}"][:, critical] for end in ENDS])
@@ -148,7 +148,7 @@ def joint_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
         "critical_end": quantity(ranking_measure(arrays).worse_end(arrays, critical)),
         "peel_stress": quantity(float(PEEL.peaks(arrays)[critical]), "Pa"),
         "layer_von_mises": quantity(float(layer[:, critical].max()), "Pa"),
-        **{name: quantity(float(item.peaks(arrays)[critical]), item.unit) for name, item in flows(arrays).items()},
+        **{name: quantity(float(item.peaks(arrays)[critical]), item.unit) for name, item in _flows(arrays).items()},
         "section_axial_force": quantity(float(sections[..., 0].max()), "N"),
         "section_shear_force": quantity(float(np.hypot(sections[..., 1], sections[..., 2]).max()), "N"),
         "section_torsion_moment": quantity(float(np.abs(sections[..., 3]).max()), "N m"),
@@ -160,26 +160,26 @@ def joint_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
         **({"residual_stress_critical_joint": quantity(start, "Pa")} if start > 0.0 else {}),
         "peak_element_stress": quantity(float(arrays["von_mises_max"].max()), "Pa"),
     }
-    return values | flow_metrics(arrays)
+    return values | _flow_metrics(arrays)
 
 
-def flows(arrays: Mapping[str, NDArray]) -> dict[str, Measure]:
+def _flows(arrays: Mapping[str, NDArray]) -> dict[str, Measure]:
     """Return the measures of plastic flow in the layer by metric name; empty if solder does not yield."""
-    return {"layer_plastic_strain": PLASTIC_STRAIN, "layer_plastic_work": PLASTIC_WORK} if has_flow(arrays) else {}
+    return {"layer_plastic_strain": PLASTIC_STRAIN, "layer_plastic_work": PLASTIC_WORK} if _has_flow(arrays) else {}
 
 
-def has_flow(arrays: Mapping[str, NDArray]) -> bool:
+def _has_flow(arrays: Mapping[str, NDArray]) -> bool:
     """Return whether the solder of a run may yield."""
     return "plastic_strain_max" in arrays
 
 
-def acceleration_metrics(arrays: Mapping[str, NDArray], request: RunInput) -> dict[str, Any]:
+def _acceleration_metrics(arrays: Mapping[str, NDArray], request: RunInput) -> dict[str, Any]:
     """Return the peak filtered accelerations of package and watch points."""
     pulse, low_pass = shock_pulse(request.shock).pulse, request.shock.filter
     return peaks_of(drop_accelerations(arrays, pulse, low_pass, request.watch), low_pass)
 
 
-def response_metrics(modes: ModeTable | None, shock: Shock, end: float) -> dict[str, Any]:
+def _response_metrics(modes: ModeTable | None, shock: Shock, end: float) -> dict[str, Any]:
     """Return the shock response of the input, up to the end of the run [s], at the board's first frequency."""
     if modes is None:
         return {}
@@ -189,9 +189,9 @@ def response_metrics(modes: ModeTable | None, shock: Shock, end: float) -> dict[
     return {"response_at_first_frequency": quantity(float(response) / STANDARD_GRAVITY, "G")}
 
 
-def flow_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
+def _flow_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
     """Return the largest plastic work density and plastic strain of all joints; empty if solder does not yield."""
-    if not has_flow(arrays):
+    if not _has_flow(arrays):
         return {}
     return {
         "peak_plastic_work_density": quantity(float(PLASTIC_WORK.peaks(arrays).max()), "J/m^3"),
@@ -199,7 +199,7 @@ def flow_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
     }
 
 
-def section_residual(arrays: Mapping[str, NDArray]) -> float:
+def _section_residual(arrays: Mapping[str, NDArray]) -> float:
     """Return the largest imbalance of a joint's section forces and inertia, relative to the largest section force.
 
     The reference is at least ``NO_FORCE``, since only round-off exists before the first wave arrives.
@@ -210,7 +210,7 @@ def section_residual(arrays: Mapping[str, NDArray]) -> float:
     return float(arrays["section_imbalance"].max()) / max(largest, NO_FORCE)
 
 
-def effects(request: RunInput, summary: dict[str, Any], neglected_strain: float) -> dict[str, Any]:
+def _effects(request: RunInput, summary: dict[str, Any], neglected_strain: float) -> dict[str, Any]:
     """Return the simulated effects with the reason for each."""
     tied, ratio = summary["tied_nodes"], f"step ratio m = {summary['substeps']}"
     shock, pulse = request.shock, shock_pulse(request.shock)

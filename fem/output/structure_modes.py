@@ -48,7 +48,7 @@ def find_modes(comm: MPI.Comm, model: StructureModel, mass: float, request: Stru
     Raises:
         AgreedError: More modes are requested than there are equations; on every rank.
     """
-    body = at_rest_supports(model, request)
+    body = _at_rest_supports(model, request)
     try:
         modes = natural_modes(Equations.of(comm, body), request.dynamics.modes)
     except ValueError as error:  # every rank counts the same equations
@@ -56,11 +56,11 @@ def find_modes(comm: MPI.Comm, model: StructureModel, mass: float, request: Stru
     table = ModeTable(modes.frequency, modes.effective_mass / mass)
     if comm.rank == 0:
         write_modes(request.output, table)
-    write_shapes(comm, replace(model, body=body), request, modes)
+    _write_shapes(comm, replace(model, body=body), request, modes)
     return table
 
 
-def at_rest_supports(model: StructureModel, request: StructureInput) -> Body:
+def _at_rest_supports(model: StructureModel, request: StructureInput) -> Body:
     """Return the body with all nodes fixed that a large mass or a prescribed motion moves."""
     moved = [(request.supports[name].on, slice(None)) for name in shaken_supports(request)]
     loads = [load for load in request.loads.values() if isinstance(load, PrescribedMotion)]
@@ -73,10 +73,10 @@ def at_rest_supports(model: StructureModel, request: StructureInput) -> Body:
 
 def write_modes(folder: Path, table: ModeTable) -> None:
     """Write ``modes.json``."""
-    (folder / "modes.json").write_text(json.dumps(mode_rows(table), indent=1), encoding="utf-8")
+    (folder / "modes.json").write_text(json.dumps(_mode_rows(table), indent=1), encoding="utf-8")
 
 
-def mode_rows(table: ModeTable) -> list[dict[str, Any]]:
+def _mode_rows(table: ModeTable) -> list[dict[str, Any]]:
     """Return the modes as records of number, frequency [Hz] and mass fraction along x, y, z."""
     return [
         {
@@ -88,7 +88,7 @@ def mode_rows(table: ModeTable) -> list[dict[str, Any]]:
     ]
 
 
-def write_shapes(comm: MPI.Comm, model: StructureModel, request: StructureInput, modes: Modes) -> None:
+def _write_shapes(comm: MPI.Comm, model: StructureModel, request: StructureInput, modes: Modes) -> None:
     """Write ``modes.pvd`` with the scaled shape of mode k at "time" k; collective."""
     part = model.tables.part[model.body.local.cell_numbers]
     fields = Fields(comm, model.body, part, request.output / "modes.pvd")

@@ -59,24 +59,24 @@ class StructureReport:
         tables = next(iter(outcome.models.values())).tables
         coupling = {"coupling": outcome.coupling | {"placement": timings.balance}} if outcome.coupling else {}
         return {
-            "metrics": cost_metrics(summary, timings)
-            | factor_metrics(outcome.factor)
+            "metrics": _cost_metrics(summary, timings)
+            | _factor_metrics(outcome.factor)
             | {"energy_balance_error": quantity(outcome.history.balance.balance_error)}
-            | energy_metrics(arrays)
+            | _energy_metrics(arrays)
             | point_metrics(arrays)
             | gauge_metrics(arrays, self.request.dynamics.filter)
-            | acceleration_metrics(arrays, self.request)
-            | layer_metrics(outcome.peaks)
+            | _acceleration_metrics(arrays, self.request)
+            | _layer_metrics(outcome.peaks)
             | mode_metrics(outcome.modes),
             "health": health(self.request, outcome),
             "effects": effects(self.request, summary["added_mass"], outcome.neglected_strain)
-            | strain_effect(tables.fitted.points),
+            | _strain_effect(tables.fitted.points),
             "balance": timings.balance,
             **coupling,
         }
 
 
-def cost_metrics(summary: dict[str, Any], timings: Timings) -> dict[str, Any]:
+def _cost_metrics(summary: dict[str, Any], timings: Timings) -> dict[str, Any]:
     """Return steps, speed and masses; critical step and element updates only for explicit solvers."""
     rate = summary["steps"] * (1.0 - timings.first / summary["windows"]) / timings.windows
     metrics = {
@@ -94,14 +94,14 @@ def cost_metrics(summary: dict[str, Any], timings: Timings) -> dict[str, Any]:
     }
 
 
-def factor_metrics(cost: FactorCost | None) -> dict[str, Any]:
+def _factor_metrics(cost: FactorCost | None) -> dict[str, Any]:
     """Return size and memory of the factored matrix; empty for explicit solvers."""
     if cost is None:
         return {}
     return {"factor_entries": quantity(cost.entries), "factor_memory": quantity(cost.memory / 1e6, "MB")}
 
 
-def strain_effect(watch: PointTable) -> dict[str, Any]:
+def _strain_effect(watch: PointTable) -> dict[str, Any]:
     """Return whether strain and stress of all watch points are evaluated at the points themselves."""
     displaced = watch.displaced
     heights = [f"{name} at z = {watch.strain_points[watch.names.index(name), 2]:.4g} m" for name in displaced]
@@ -109,19 +109,19 @@ def strain_effect(watch: PointTable) -> dict[str, Any]:
     return {"strain_at_surface": {"on": not displaced, "why": why if displaced else "linear fit to element means"}}
 
 
-def energy_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
+def _energy_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
     """Return the peak of each energy of the energy balance that is not always zero [J]."""
     names = ("kinetic", "internal", "plastic", "hourglass", "damping", "external")
     peaks = {name: float(np.abs(arrays[name]).max()) for name in names if name in arrays}
     return {f"peak_{name}_energy": quantity(peak, "J") for name, peak in peaks.items() if peak > 0.0}
 
 
-def acceleration_metrics(arrays: Mapping[str, NDArray], request: StructureInput) -> dict[str, Any]:
+def _acceleration_metrics(arrays: Mapping[str, NDArray], request: StructureInput) -> dict[str, Any]:
     """Return the peak filtered accelerations of watch points."""
     return peaks_of(watch_accelerations(arrays, request, pulses_of(request.loads)), request.dynamics.filter)
 
 
-def layer_metrics(peaks: dict[str, dict[str, float]]) -> dict[str, Any]:
+def _layer_metrics(peaks: dict[str, dict[str, float]]) -> dict[str, Any]:
     """Return the largest element values of each layer over the field samples."""
     names = {
         "von_mises": ("peak_element_stress", "Pa"),

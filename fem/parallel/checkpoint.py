@@ -105,7 +105,7 @@ class Checkpoints:
         """Return whether all files of a checkpoint are intact, and warn of damaged ones; collective."""
         checked_here = range(self._comm.rank, checkpoint.ranks, self._comm.size)
         faults = self._comm.allgather(
-            [fault for rank in checked_here for fault in faults_of(checkpoint.folder, rank, checkpoint.generation)]
+            [fault for rank in checked_here for fault in _faults_of(checkpoint.folder, rank, checkpoint.generation)]
         )
         if self._comm.rank == 0:
             for fault in (fault for rank_faults in faults for fault in rank_faults):
@@ -130,7 +130,7 @@ class Checkpoints:
         self._comm.Barrier()  # no rank may overwrite its older file before all have the newer one
         self.latest = Checkpoint(window, True, self._run_folder, self._generation, self._comm.size, time)
         if self._comm.rank == 0:
-            remove_others(self._run_folder)
+            _remove_others(self._run_folder)
         self._generation = (self._generation + 1) % GENERATIONS
         self._written = monotonic()
 
@@ -162,11 +162,11 @@ class Checkpoints:
             CheckpointError: The files lack nodes or cells of this rank.
         """
         if not self.moved:
-            return read_state(paths[self._comm.rank])
+            return _read_state(paths[self._comm.rank])
         state = checkpoint_state.blank(like)
         for path in paths:
             if path.exists():  # a rank without this model has no file
-                checkpoint_state.take(state, read_state(path), self._first)
+                checkpoint_state.take(state, _read_state(path), self._first)
         if not checkpoint_state.is_complete(state):
             raise CheckpointError(f"the checkpoint files in {paths[0].parent} lack nodes or cells of this run")
         return state
@@ -179,7 +179,7 @@ class Checkpoints:
         return digest_of(repr(by_rank).encode())
 
 
-def read_state(path: Path) -> Any:
+def _read_state(path: Path) -> Any:
     """Read the state of a file.
 
     Raises:
@@ -188,20 +188,20 @@ def read_state(path: Path) -> Any:
     return read_data(path, ENTRIES)
 
 
-def faults_of(folder: Path, rank: int, generation: int) -> list[str]:
+def _faults_of(folder: Path, rank: int, generation: int) -> list[str]:
     """Return the faults of the files of a rank, its state and its additional states; empty if all are intact."""
     path = folder / STATE.format(rank=rank, generation=generation)
     header, faults = header_of(path), []
     names = header.extras if header else ()
     for file in (path, *(folder / EXTRA.format(name=name, rank=rank) for name in names)):
         try:
-            read_state(file)
+            _read_state(file)
         except NotData as error:
             faults.append(str(error))
     return faults
 
 
-def remove_others(run_folder: Path) -> None:
+def _remove_others(run_folder: Path) -> None:
     """Remove the checkpoint folders of other inputs and partitions next to the folder of a run."""
     for folder in run_folder.parent.iterdir():
         if folder != run_folder and FOLDER_NAME.fullmatch(folder.name):

@@ -138,36 +138,36 @@ class Log:
 ENTRIES = (Rows, Shares, Sum, Same, Log)
 
 
-def leaves(state: "State | Entry") -> Iterator[Entry]:
+def _leaves(state: "State | Entry") -> Iterator[Entry]:
     """Yield all entries of a state in order."""
     if isinstance(state, Mapping):
         for node in state.values():
-            yield from leaves(node)
+            yield from _leaves(node)
     else:
         yield state
 
 
-def map_state(state: "State | Entry", change: Callable[[Entry], Any]) -> Any:
+def _map_state(state: "State | Entry", change: Callable[[Entry], Any]) -> Any:
     """Return the tree of a state with each entry replaced by ``change(entry)``."""
     if isinstance(state, Mapping):
-        return {name: map_state(node, change) for name, node in state.items()}
+        return {name: _map_state(node, change) for name, node in state.items()}
     return change(state)
 
 
 def values(state: State) -> dict[str, Any]:
     """Return the tree of values, the argument of ``restore``."""
-    return map_state(state, lambda entry: entry.value)
+    return _map_state(state, lambda entry: entry.value)
 
 
 def blank(state: State) -> State:
     """Return an empty state for the same nodes and cells."""
-    return map_state(state, lambda entry: entry.blank())
+    return _map_state(state, lambda entry: entry.blank())
 
 
 def layout(state: State) -> str:
     """Return a digest of the nodes and cells of a state."""
     digest = hashlib.sha256()
-    for entry in leaves(state):
+    for entry in _leaves(state):
         digest.update(entry.layout)
     return digest.hexdigest()
 
@@ -181,18 +181,18 @@ def take(state: State, part: State, first: Collection[str]) -> None:
         first: Names in ``state`` that no lower rank has.
     """
     for name in state.keys() & part.keys():
-        merge(state[name], part[name], name in first)
+        _merge(state[name], part[name], name in first)
 
 
-def merge(node: "State | Entry", part: Any, first: bool) -> None:
+def _merge(node: "State | Entry", part: Any, first: bool) -> None:
     """Merge the entries of another rank into the entries at the same positions in the tree."""
     if not isinstance(node, Mapping):
         node.take(part, first)
         return
     for name in node.keys() & part.keys():
-        merge(node[name], part[name], first)
+        _merge(node[name], part[name], first)
 
 
 def is_complete(state: State) -> bool:
     """Return whether all rows of a state have been filled."""
-    return not any(isinstance(entry, Rows) and np.isnan(entry.value).any() for entry in leaves(state))
+    return not any(isinstance(entry, Rows) and np.isnan(entry.value).any() for entry in _leaves(state))

@@ -31,7 +31,7 @@ class MessageClock:
         self.waiting += arrived - packed
 
 
-def holders(comm: MPI.Comm, nodes: NDArray[np.integer]) -> list[NDArray[np.int64]]:
+def _holders(comm: MPI.Comm, nodes: NDArray[np.integer]) -> list[NDArray[np.int64]]:
     """Determine the nodes that this rank shares with each other rank; collective.
 
     Each node number has a home rank (number modulo size) that collects its holders, so no rank ever sees all nodes.
@@ -70,7 +70,7 @@ class SharedNodes:
     def __init__(self, comm: MPI.Comm, nodes: NDArray[np.integer], clock: MessageClock | None = None) -> None:
         """Determine the copies of this rank's nodes, shape (n,), and prepare the messages; collective."""
         self.clock = clock or MessageClock()
-        shared = holders(comm, nodes)
+        shared = _holders(comm, nodes)
         order = np.argsort(nodes)
         local = [order[np.searchsorted(nodes, numbers, sorter=order)].astype(np.int32) for numbers in shared]
         self.owned = np.ones(len(nodes), dtype=bool)
@@ -186,7 +186,7 @@ class Channel:
         into = [np.flatnonzero(targets[comm.rank] & (sender[comm.rank] == other)) for other in range(comm.size)]
         self._out_rows, self._in_rows = source[np.concatenate(out)], target[np.concatenate(into)]
         self._sent, self._received = np.empty((len(self._out_rows), 3)), np.empty((len(self._in_rows), 3))
-        sent, received = split_rows(self._sent, out), split_rows(self._received, into)
+        sent, received = _split_rows(self._sent, out), _split_rows(self._received, into)
         self._copied = sent[comm.rank], received[comm.rank]
         others = [other for other in range(comm.size) if other != comm.rank]
         self._sends = [comm.Send_init(sent[k], k, CHANNEL_TAG) for k in others if len(sent[k])]
@@ -232,7 +232,7 @@ class Channel:
         self._sends, self._receives = [], []
 
 
-def split_rows(buffer: NDArray[np.float64], parts: list[NDArray[np.int64]]) -> list[NDArray[np.float64]]:
+def _split_rows(buffer: NDArray[np.float64], parts: list[NDArray[np.int64]]) -> list[NDArray[np.float64]]:
     """Split a buffer into views of consecutive rows, one for each part."""
     ends = np.cumsum([len(part) for part in parts])
     return [buffer[end - len(part) : end] for part, end in zip(parts, ends, strict=True)]

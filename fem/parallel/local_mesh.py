@@ -76,7 +76,7 @@ def distribute(comm: MPI.Comm, data: MeshData | None, ranks: NDArray[np.int32] |
     nodes = comm.bcast(data.shape.nodes if data else None)
     points = data.points if data else np.empty((0, 3))
     cells = data.cells if data else np.empty((0, nodes), np.int64)
-    mesh = dolfinx_api.make_mesh(comm, points, cells, destinations(comm, data, ranks))
+    mesh = dolfinx_api.make_mesh(comm, points, cells, _destinations(comm, data, ranks))
     return LocalMesh(
         mesh,
         dolfinx_api.input_nodes(mesh),
@@ -86,7 +86,7 @@ def distribute(comm: MPI.Comm, data: MeshData | None, ranks: NDArray[np.int32] |
     )
 
 
-def destinations(comm: MPI.Comm, data: MeshData | None, ranks: NDArray[np.int32] | None) -> NDArray[np.int32] | None:
+def _destinations(comm: MPI.Comm, data: MeshData | None, ranks: NDArray[np.int32] | None) -> NDArray[np.int32] | None:
     """Return the prescribed rank of each cell that this rank has before distribution, None without a prescription."""
     chosen = comm.bcast(ranks is not None)
     return (ranks if data else np.empty(0, np.int32)) if chosen else None

@@ -51,30 +51,30 @@ def partition(mesh: MeshData, work: NDArray[np.float64], speeds: NDArray[np.floa
     node_work = np.bincount(mesh.cells.ravel(), weights=shares, minlength=len(mesh.points)).astype(float)
     cells = Cells(mesh.points[mesh.cells].mean(axis=1), mesh.cells, work, node_work)
     rank = np.zeros(len(mesh.cells), np.int32)
-    assign(cells, np.asarray(speeds, float), 0, rank)
+    _assign(cells, np.asarray(speeds, float), 0, rank)
     return rank
 
 
-def assign(cells: Cells, speeds: NDArray[np.float64], first: int, rank: NDArray[np.int32]) -> None:
+def _assign(cells: Cells, speeds: NDArray[np.float64], first: int, rank: NDArray[np.int32]) -> None:
     """Write the rank of each cell, shape (ne,), for consecutive ranks from ``first`` on with given speeds."""
     if len(speeds) == 1 or len(rank) < len(speeds):
         rank[:] = first + np.arange(len(rank)) % len(speeds)
         return
     middle = len(speeds) // 2
-    left = bisect(cells, float(speeds[:middle].sum()), float(speeds[middle:].sum()))
+    left = _bisect(cells, float(speeds[:middle].sum()), float(speeds[middle:].sum()))
     for side, side_speeds, start in ((left, speeds[:middle], first), (~left, speeds[middle:], first + middle)):
         part = np.empty(int(side.sum()), np.int32)
-        assign(cells.subset(side), side_speeds, start, part)
+        _assign(cells.subset(side), side_speeds, start, part)
         rank[side] = part
 
 
-def bisect(cells: Cells, left: float, right: float) -> NDArray[np.bool_]:
+def _bisect(cells: Cells, left: float, right: float) -> NDArray[np.bool_]:
     """Return which cells are on the left side, shape (ne,), for the speeds of both sides."""
-    cuts = [sweep(cells, direction, left, right) for direction in directions(cells.centres)]
+    cuts = [_sweep(cells, direction, left, right) for direction in _directions(cells.centres)]
     return min(cuts, key=lambda cut: cut[1])[0]
 
 
-def sweep(cells: Cells, direction: NDArray[np.float64], left: float, right: float) -> tuple[NDArray[np.bool_], float]:
+def _sweep(cells: Cells, direction: NDArray[np.float64], left: float, right: float) -> tuple[NDArray[np.bool_], float]:
     """Cut normal to a direction, shape (3,), in the ratio of the speeds; return left side and window time [s]."""
     order = np.argsort(cells.centres @ direction, kind="stable")
     cumulative = np.cumsum(cells.work[order].sum(axis=1))
@@ -86,7 +86,7 @@ def sweep(cells: Cells, direction: NDArray[np.float64], left: float, right: floa
     return side, float(levels.sum() + NODE_COST * cells.node_work[shared].sum() / (left + right))
 
 
-def directions(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _directions(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return cut directions, shape (k, 3): several in the plane of the two largest extents, and its normal."""
     axes = np.eye(3)[np.argsort(-np.ptp(points, axis=0))]
     angles = np.pi / ANGLES * np.arange(ANGLES)[:, None]

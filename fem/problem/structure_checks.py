@@ -34,7 +34,7 @@ def problems(problem: StructureProblem) -> list[Problem]:
         *_large_mass(problem),
         *_symmetry(problem),
         *_dynamics(problem),
-        *coupling_problems(problem),
+        *_coupling_problems(problem),
     ]
 
 
@@ -246,7 +246,7 @@ def _numerics(problem: StructureProblem) -> Iterator[Problem]:
         yield Problem("dynamics.numerics.mass_scaled", message, list(numerics.mass_scaled))
 
 
-def coupling_problems(problem: StructureProblem) -> Iterator[Problem]:
+def _coupling_problems(problem: StructureProblem) -> Iterator[Problem]:
     """Yield parameters that two coupled models do not support; nothing if there is a single model."""
     coupling = problem.dynamics.coupling
     if coupling is None:

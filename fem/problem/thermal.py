@@ -56,22 +56,22 @@ class Thermal(Parameters):
     @field_validator("peak")
     @classmethod
     def _is_heated(cls, value: float, info: ValidationInfo) -> float:
-        return check_range(value, info, "reference", None)
+        return _check_range(value, info, "reference", None)
 
     @field_validator("melting")
     @classmethod
     def _melts_on_heating(cls, value: float, info: ValidationInfo) -> float:
-        return check_range(value, info, "reference", "peak")
+        return _check_range(value, info, "reference", "peak")
 
     @field_validator("solidification")
     @classmethod
     def _solidifies_on_cooling(cls, value: float, info: ValidationInfo) -> float:
-        return check_range(value, info, None, "peak")
+        return _check_range(value, info, None, "peak")
 
     @field_validator("final")
     @classmethod
     def _is_solid_in_the_end(cls, value: float, info: ValidationInfo) -> float:
-        return check_range(value, info, None, "solidification")
+        return _check_range(value, info, None, "solidification")
 
     @field_validator("corner_displacement")
     @classmethod
@@ -100,7 +100,7 @@ class Thermal(Parameters):
         return min(map(self.corner, (self.melting, self.peak, self.solidification)))
 
 
-def check_range(value: float, info: ValidationInfo, low: str | None, high: str | None) -> float:
+def _check_range(value: float, info: ValidationInfo, low: str | None, high: str | None) -> float:
     """Return a temperature [K] if it lies between two other fields.
 
     Args:

@@ -39,19 +39,19 @@ def run_cooling(world: MPI.Comm, request: CoolingInput) -> None:
         AgreedError: The input or a mesh does not fit, or equilibrium is not reached; on every rank.
     """
     start = time.perf_counter()
-    package = agreed(world, lambda: read_pinned_package(request) if world.rank == 0 else None)
+    package = agreed(world, lambda: _read_pinned_package(request) if world.rank == 0 else None)
     tables: JointTables = world.bcast(package.model.tables if package else None)
     ACTIVITY.slow = "cools the model"
-    rank_elements = distribute_model(world, package.model.mesh if package else None, tables, request)
+    rank_elements = _distribute_model(world, package.model.mesh if package else None, tables, request)
     ones = np.ones(len(rank_elements.steps))
     body = make_body(world, rank_elements, tables, ones, ForceOptions())
     statics = Statics(world, body, rank_elements.materials, request.change)
     equilibrium, memory = statics.solve(), statics.memory
     statics.free()
     loaded = with_initial_stress(body, rank_elements.materials, equilibrium.displacement, request.change, path=True)
-    residual, seconds = measure_unbalanced_force(world, loaded, statics.scale), time.perf_counter() - start
+    residual, seconds = _measure_unbalanced_force(world, loaded, statics.scale), time.perf_counter() - start
     convergence = Convergence(equilibrium.residuals, residual, equilibrium.products, memory, seconds)
-    displacement = gather_displacement(world, body, equilibrium, package)
+    displacement = _gather_displacement(world, body, equilibrium, package)
     cooled = None
     if package and displacement is not None:
         cooled = CooledPackage(package.whole, Cooling(package.whole.mesh.points, displacement, request.change))
@@ -72,7 +72,7 @@ class PinnedPackage:
     model: ModelInput[JointTables]
 
 
-def read_pinned_package(request: CoolingInput) -> PinnedPackage:
+def _read_pinned_package(request: CoolingInput) -> PinnedPackage:
     """Read all meshes as one model on its symmetry planes, with all other rigid-body motions pinned."""
     whole = join_meshes(read_package(request))
     return PinnedPackage(whole, add_pins(model_inputs(whole, "dns", SYMMETRY)["dns"]))
@@ -90,7 +90,7 @@ def add_pins(item: ModelInput[JointTables]) -> ModelInput[JointTables]:
     return replace(item, tables=replace(tables, held_nodes=nodes, held=held[nodes]))
 
 
-def distribute_model(
+def _distribute_model(
     world: MPI.Comm, mesh: MeshData | None, tables: JointTables, request: CoolingInput
 ) -> RankElements:
     """Distribute the mesh and assign materials to the elements of each rank; collective."""
@@ -100,7 +100,7 @@ def distribute_model(
     return agreed(world, lambda: make_rank_elements(local, tables, request.materials, formulation))
 
 
-def measure_unbalanced_force(world: MPI.Comm, body: Body, scale: float) -> float:
+def _measure_unbalanced_force(world: MPI.Comm, body: Body, scale: float) -> float:
     """Return the norm of the unbalanced force at the start of the shock, relative to ``scale`` [N]; collective."""
     motion = explicit_motion(body, [], 1.0)
     motion.update_force()
@@ -109,7 +109,7 @@ def measure_unbalanced_force(world: MPI.Comm, body: Body, scale: float) -> float
     return float(np.sqrt(square)) / scale if scale > 0.0 else 0.0
 
 
-def gather_displacement(
+def _gather_displacement(
     world: MPI.Comm, body: Body, equilibrium: Equilibrium, package: PinnedPackage | None
 ) -> NDArray[np.float64] | None:
     """Return the displacement of all nodes of the joined mesh, shape (n, 3) [m], on rank 0, else None; collective."""

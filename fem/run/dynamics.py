@@ -98,7 +98,7 @@ def run_dynamics(world: MPI.Comm, problem: DynamicProblem) -> None:
         models, steps = problem.build(comms, plan.cells)
         modes = problem.find_modes(comms, models, steps)
         participants, clocks, checked = make_participants(comms, problem, models, steps)
-        outputs = make_outputs(comms, problem, models, steps)
+        outputs = _make_outputs(comms, problem, models, steps)
         stopwatch = Stopwatch({role: model.body.shared.clock for role, model in models.items()}, clocks)
         ready = time.perf_counter()
         windows, output_seconds = run_time_loop(comms.world, participants, outputs, stopwatch)
@@ -111,10 +111,10 @@ def run_dynamics(world: MPI.Comm, problem: DynamicProblem) -> None:
             models=models,
             steps=steps,
             history=outputs.history,
-            peaks=element_peaks(comms.world, outputs.fields.values(), part_names(models)),
+            peaks=element_peaks(comms.world, outputs.fields.values(), _part_names(models)),
             coupling=(problem.divided.coupling if problem.divided else {}) | recorded(checked),
             modes=modes,
-            factor=factor_cost(participants),
+            factor=_factor_cost(participants),
         )
         write_result(comms, problem.report, outcome, timings)
         for pictures in outputs.pictures:
@@ -137,7 +137,7 @@ def make_participants(comms: Communicators, problem: DynamicProblem, models: Mod
         coupled = couple(comms, bodies, loads, steps.plan, scheme)
     else:
         [(role, body)] = bodies.items()
-        motion = make_motion(comms.models[role], body, loads[role], steps.plan.step, problem.request)
+        motion = _make_motion(comms.models[role], body, loads[role], steps.plan.step, problem.request)
         coupled = CoupledRun({role: SingleModel(motion, steps.plan)}, [])
     for participant in coupled.participants.values():
         if any(problem.request.initial_velocity):
@@ -145,7 +145,7 @@ def make_participants(comms: Communicators, problem: DynamicProblem, models: Mod
     return coupled
 
 
-def make_motion(
+def _make_motion(
     comm: MPI.Comm, body: Body, loads: list[Load], step: float, request: RunInput | StructureInput
 ) -> Motion:
     """Return the motion of a single model for the run's solver, starting at rest; collective.
@@ -161,13 +161,13 @@ def make_motion(
         raise AgreedError(f"implicit solver: {error}") from error
 
 
-def make_outputs(comms: Communicators, problem: DynamicProblem, models: Models, steps: Steps) -> Outputs:
+def _make_outputs(comms: Communicators, problem: DynamicProblem, models: Models, steps: Steps) -> Outputs:
     """Open the output files of a run and identify the inputs of its checkpoints; collective."""
     request, numerics = problem.request, problem.request.numerics
     inputs = request.computed, steps.plan, digest_of_files(*request.files)
     return Outputs(
         history=make_history(comms.world, problem, models, steps),
-        fields=make_fields(comms, models, request),
+        fields=_make_fields(comms, models, request),
         field_samples=numerics.field_samples,
         checkpoints=Checkpoints(comms.world, request.checkpoints, inputs, numerics.checkpoint_seconds),
         pictures=problem.pictures(comms.world, models, steps),
@@ -183,9 +183,9 @@ def make_history(world: MPI.Comm, problem: DynamicProblem, models: Models, steps
     return History(world, watches, balance, problem.signals)
 
 
-def make_fields(comms: Communicators, models: Models, request: RunInput | StructureInput) -> dict[Role, Fields]:
+def _make_fields(comms: Communicators, models: Models, request: RunInput | StructureInput) -> dict[Role, Fields]:
     """Open one field file for each model of this rank; collective."""
-    _, materials = materials_of_parts(part_names(models), request.part_materials)
+    _, materials = materials_of_parts(_part_names(models), request.part_materials)
     yields = any(material.plasticity is not None for material in materials)
     fields = {}
     for role, model in models.items():
@@ -194,12 +194,12 @@ def make_fields(comms: Communicators, models: Models, request: RunInput | Struct
     return fields
 
 
-def part_names(models: Models) -> tuple[str, ...]:
+def _part_names(models: Models) -> tuple[str, ...]:
     """Return the names of the parts, which are the same in all models of a run."""
     return next(iter(models.values())).tables.part_names
 
 
-def factor_cost(participants: Mapping[Role, Participant]) -> FactorCost | None:
+def _factor_cost(participants: Mapping[Role, Participant]) -> FactorCost | None:
     """Return the factorisation cost of an implicit solver, None for an explicit one."""
     motion = next(iter(participants.values())).motion
     return motion.factor.cost if isinstance(motion, ImplicitMotion) else None

@@ -53,7 +53,7 @@ class PackageDrop:
         if request.coupled:
             check_size(request.shock.ranks, world.size)
         divided = divide_package(world, request)
-        return cls(request, divided, agreed(world, lambda: pulse_of(request, divided.steps.plan.window)))
+        return cls(request, divided, agreed(world, lambda: _pulse_of(request, divided.steps.plan.window)))
 
     @property
     def signals(self) -> Mapping[str, Signal]:
@@ -120,7 +120,7 @@ class PackageDrop:
         if not self.request.shock.modes:
             return None
         with ACTIVITY.busy("finds natural modes"):
-            modes = agreed(comms.world, lambda: modes_of(self.request) if comms.world.rank == 0 else None)
+            modes = agreed(comms.world, lambda: _modes_of(self.request) if comms.world.rank == 0 else None)
         table: ModeTable = comms.world.bcast(modes)
         return table
 
@@ -130,7 +130,7 @@ def run_package(world: MPI.Comm, request: RunInput) -> None:
     run_dynamics(world, PackageDrop.read(world, request))
 
 
-def modes_of(request: RunInput) -> ModeTable:
+def _modes_of(request: RunInput) -> ModeTable:
     """Compute and write the natural modes of board and package, with coarse joints if a mesh of them exists.
 
     The model is linear elastic, undivided, and its supports are at rest.
@@ -145,7 +145,7 @@ def modes_of(request: RunInput) -> ModeTable:
     return table
 
 
-def pulse_of(request: RunInput, window: float) -> Pulse:
+def _pulse_of(request: RunInput, window: float) -> Pulse:
     """Return the pulse of a run with the given window [s]; raises as ``shock_pulse`` and ``check_pulses``."""
     pulse = shock_pulse(request.shock).pulse
     if request.coupled:

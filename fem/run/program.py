@@ -28,7 +28,7 @@ RUNS: dict[type, Callable[[MPI.Comm, Any], None]] = {
 def main(world: MPI.Comm, arguments: list[str]) -> int:
     """Run the input file named by the only argument on all ranks of ``world``, and return the exit code."""
     try:
-        request = agreed(world, lambda: read_input(arguments))
+        request = agreed(world, lambda: _read_input(arguments))
     except AgreedError as error:
         if world.rank == 0:
             print(f"error: {error}", file=sys.stderr, flush=True)
@@ -41,21 +41,21 @@ def main(world: MPI.Comm, arguments: list[str]) -> int:
             watchdog.speak(str(error))
         return 1
     except InvertedElementError as error:
-        end_all(world, watchdog, str(error))
+        _end_all(world, watchdog, str(error))
     except Exception:
-        end_all(world, watchdog, f"\n{traceback.format_exc().rstrip()}")
+        _end_all(world, watchdog, f"\n{traceback.format_exc().rstrip()}")
     finally:
         watchdog.stop()
     return 0
 
 
-def end_all(world: MPI.Comm, watchdog: Watchdog, message: str) -> None:
+def _end_all(world: MPI.Comm, watchdog: Watchdog, message: str) -> None:
     """Report an error that occurred only on this rank, and end the ranks that wait for it."""
     watchdog.speak(f"rank {world.rank}: {message}")
     world.Abort(1)
 
 
-def read_input(arguments: list[str]) -> RunInput | CoolingInput | StructureInput:
+def _read_input(arguments: list[str]) -> RunInput | CoolingInput | StructureInput:
     """Read and check the input file, and create the output directory."""
     if len(arguments) != 1:
         raise ValueError("usage: mpirun -n N python -m fem INPUT.json")

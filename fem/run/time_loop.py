@@ -89,27 +89,27 @@ def run_time_loop(
     plan = next(iter(participants.values())).plan
     field_windows = set(np.linspace(0, plan.windows, outputs.field_samples).round().astype(int).tolist())
     reported, output_seconds, first = time.perf_counter(), 0.0, 0
-    state = outputs.checkpoints.read(state_of(participants, outputs))
+    state = outputs.checkpoints.read(_state_of(participants, outputs))
     if state is not None and outputs.checkpoints.continued is not None:
         first = outputs.checkpoints.continued + 1
-        output_seconds += restore_checkpoint(
+        output_seconds += _restore_checkpoint(
             participants, outputs, state, [window for window in sorted(field_windows) if window < first]
         )
     for window in range(first, plan.windows + 1):
         ACTIVITY.window = window
         if window:
             run_window(participants, stopwatch)
-        sampled = take_samples(participants, outputs, window)
+        sampled = _take_samples(participants, outputs, window)
         over = window == plan.windows or (sampled and is_over(world, outputs))
         if over or window in field_windows:
-            output_seconds += write_fields(participants, outputs, window)
+            output_seconds += _write_fields(participants, outputs, window)
         if over:
             break
         if sampled and outputs.checkpoints.is_due():
-            write_checkpoint(participants, outputs, window)
+            _write_checkpoint(participants, outputs, window)
         if world.rank == 0 and time.perf_counter() - reported > PROGRESS_INTERVAL:
             reported = time.perf_counter()
-            print(json.dumps({"progress": window / plan.windows, "time": time_of(participants)}), flush=True)
+            print(json.dumps({"progress": window / plan.windows, "time": _time_of(participants)}), flush=True)
     ACTIVITY.slow = "writes the results"
     for file in outputs.fields.values():
         file.close()
@@ -126,7 +126,7 @@ def is_over(world: MPI.Comm, outputs: Outputs) -> bool:
     return over
 
 
-def take_samples(participants: Participants, outputs: Outputs, window: int) -> bool:
+def _take_samples(participants: Participants, outputs: Outputs, window: int) -> bool:
     """Take the samples and snapshots due after a window, and return whether a sample was due."""
     plan = next(iter(participants.values())).plan
     sampled = window % plan.stride == 0 or window == plan.windows
@@ -156,46 +156,46 @@ def run_window(participants: Participants, stopwatch: Stopwatch) -> None:
             stopwatch.lap(role)
         ACTIVITY.slow = ""  # from here on all kernels are compiled
     except InvertedElementError as error:
-        raise InvertedElementError(f"time {time_of(participants):.6e} s: {error}; {FLATTENED}") from error
+        raise InvertedElementError(f"time {_time_of(participants):.6e} s: {error}; {FLATTENED}") from error
 
 
-def time_of(participants: Participants) -> float:
+def _time_of(participants: Participants) -> float:
     """Return the current time of the models [s]."""
     return next(iter(participants.values())).motion.time
 
 
-def write_fields(participants: Participants, outputs: Outputs, window: int) -> float:
+def _write_fields(participants: Participants, outputs: Outputs, window: int) -> float:
     """Write the fields of all models of this rank, also for a restart; return the time spent [s]."""
     begin = time.perf_counter()
     with ACTIVITY.busy("writes fields"):
         for role, participant in participants.items():
             fields = outputs.fields[role]
-            sample = sample_fields(participant, fields)
+            sample = _sample_fields(participant, fields)
             fields.write(sample)
             outputs.checkpoints.store(f"{role}-{window}", {role: fields.state(sample)})
     return time.perf_counter() - begin
 
 
-def sample_fields(participant: Participant, fields: Fields) -> FieldSample:
+def _sample_fields(participant: Participant, fields: Fields) -> FieldSample:
     """Return the current fields of a model, with displacement relative to the base."""
     motion = participant.motion
     return fields.sample(motion.displacement - motion.base_displacement(), motion.time)
 
 
-def state_of(participants: Participants, outputs: Outputs) -> State:
+def _state_of(participants: Participants, outputs: Outputs) -> State:
     """Return the time-dependent state of this rank, for a checkpoint."""
     models: dict[str, State] = {role: participant.state() for role, participant in participants.items()}
     pictures = {f"pictures-{k}": item.state() for k, item in enumerate(outputs.pictures)}
     return models | {"history": outputs.history.state()} | pictures
 
 
-def write_checkpoint(participants: Participants, outputs: Outputs, window: int) -> None:
+def _write_checkpoint(participants: Participants, outputs: Outputs, window: int) -> None:
     """Write a checkpoint at the end of a window."""
     with ACTIVITY.busy("writes a checkpoint"):
-        outputs.checkpoints.write(window, time_of(participants), state_of(participants, outputs))
+        outputs.checkpoints.write(window, _time_of(participants), _state_of(participants, outputs))
 
 
-def restore_checkpoint(
+def _restore_checkpoint(
     participants: Participants, outputs: Outputs, state: dict[str, Any], field_windows: list[int]
 ) -> float:
     """Restore a checkpoint and rewrite its earlier fields; return the time spent on fields [s]."""
@@ -207,7 +207,7 @@ def restore_checkpoint(
         pictures.restore(state[f"pictures-{k}"])
     begin = time.perf_counter()
     like = {
-        role: outputs.fields[role].state(sample_fields(participants[role], outputs.fields[role]))
+        role: outputs.fields[role].state(_sample_fields(participants[role], outputs.fields[role]))
         for role in participants
     }
     for window in field_windows:
@@ -215,5 +215,5 @@ def restore_checkpoint(
             stored = checkpoints.stored(f"{role}-{window}", {role: like[role]})
             outputs.fields[role].write(FieldSample(**stored[role]))
     if checkpoints.moved and checkpoints.continued is not None:
-        write_checkpoint(participants, outputs, checkpoints.continued)
+        _write_checkpoint(participants, outputs, checkpoints.continued)
     return time.perf_counter() - begin

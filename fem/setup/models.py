@@ -96,7 +96,7 @@ def distribute_models(
     Returns:
         Elements of this rank by model.
     """
-    parts = send_meshes(comms, divided, ranks)
+    parts = _send_meshes(comms, divided, ranks)
     first_mesh = next(iter(divided.meshes.values()), None)
     dolfinx_api.compile_ahead(comms.world, first_mesh.points[first_mesh.cells[0]] if first_mesh else None)
     meshes = {role: distribute(comms.models[role], *part) for role, part in parts.items()}
@@ -136,7 +136,7 @@ def assemble_bodies(
 MeshAndRanks = tuple[MeshData | None, NDArray[np.int32] | None]
 
 
-def send_meshes(
+def _send_meshes(
     comms: Communicators, divided: DividedModels[Tables], ranks: Mapping[Role, NDArray[np.int32]]
 ) -> dict[Role, MeshAndRanks]:
     """Send mesh and cell ranks of each model from rank 0 to the first rank of the model; collective.

@@ -46,14 +46,14 @@ def divide_package(world: MPI.Comm, request: RunInput) -> DividedModels[JointTab
     Raises:
         AgreedError: The meshes do not fit the input; on every rank.
     """
-    return divide_on_root(world, lambda: divide_on_one_rank(request))
+    return divide_on_root(world, lambda: _divide_on_one_rank(request))
 
 
-def divide_on_one_rank(request: RunInput) -> DividedModels[JointTables]:
+def _divide_on_one_rank(request: RunInput) -> DividedModels[JointTables]:
     """Read, check and divide all meshes; raises as ``read_package`` and ``division.checks``."""
     shock = request.shock
     whole = join_meshes(with_neighbours(read_package(request), request.packages))
-    fitted = fit_board(whole, request)
+    fitted = _fit_board(whole, request)
     treatment = treatment_of(request, request.numerics.mass_scaled_step)
     unsupported = survey(whole.mesh, request.materials, treatment)
     elements = add_spring_stiffness(unsupported, whole.mesh, fitted, request.supports)
@@ -69,7 +69,7 @@ def divide_on_one_rank(request: RunInput) -> DividedModels[JointTables]:
     steps = steps_of_division(whole, elements, division, rules)
     if fitted:
         steps = replace(steps, model_mass=steps.model_mass + float(fitted.masses[1].sum()))
-    held = find_fixed_components(request)
+    held = _find_fixed_components(request)
     if request.mode == "dns":
         steps = single_model_steps(steps, float(elements.step.min()), rules)
         inputs = model_inputs(whole, "dns", held, shock.joint_layer, fitted)
@@ -93,7 +93,7 @@ def divide_on_one_rank(request: RunInput) -> DividedModels[JointTables]:
     )
 
 
-def fit_board(whole: Whole, request: RunInput) -> FittedTable | None:
+def _fit_board(whole: Whole, request: RunInput) -> FittedTable | None:
     """Return the fittings of the board as tables, None if there are none; raises as ``fit_to_mesh``."""
     if not any(getattr(request, name) for name in Fittings.model_fields):
         return None
@@ -101,7 +101,7 @@ def fit_board(whole: Whole, request: RunInput) -> FittedTable | None:
     return fit_to_mesh(whole.mesh, board, request, request.materials.board.plasticity is not None)
 
 
-def find_fixed_components(request: RunInput) -> dict[str, tuple[int, ...]]:
+def _find_fixed_components(request: RunInput) -> dict[str, tuple[int, ...]]:
     """Return the fixed components by facet set, as in ``HELD``, for hole walls, supports or a large mass."""
     if request.shock.method == "large_mass":
         return SYMMETRY
@@ -162,7 +162,7 @@ def build_elastic_package(request: RunInput) -> tuple[Model[JointTables], float]
     shock = request.shock.model_copy(update={"coupling": coupling, "method": "direct"})
     single = request.model_copy(update={"shock": shock, "meshes": meshes, "watch": {}, "gauges": {}})
     whole = join_meshes(with_neighbours(read_package(single), request.packages))
-    model = model_inputs(whole, "dns", find_fixed_components(single), shock.joint_layer, fit_board(whole, single))[
+    model = model_inputs(whole, "dns", _find_fixed_components(single), shock.joint_layer, _fit_board(whole, single))[
         "dns"
     ]
     tables, local = model.tables, distribute(MPI.COMM_SELF, model.mesh)

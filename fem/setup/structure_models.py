@@ -63,13 +63,13 @@ def build_structure(comm: MPI.Comm, request: StructureInput, pulses: list[float]
     Raises:
         AgreedError: The mesh does not fit the input; on every rank.
     """
-    mesh, tables = read_structure(comm, request)
+    mesh, tables = _read_structure(comm, request)
     local = distribute(comm, mesh)
     rank_elements = agreed(comm, lambda: make_rank_elements(local, tables, request.part_materials, request.formulation))
     beddings = beddings_of(rank_elements.local, tables.fitted, request.supports)
     for bedding in beddings:
         rank_elements = with_support_stiffness(rank_elements, bedding)
-    steps = choose_steps(comm, rank_elements, request, pulses)
+    steps = _choose_steps(comm, rank_elements, request, pulses)
     steps = replace(steps, model_mass=steps.model_mass + float(tables.fitted.masses[1].sum()))
 
     def assemble(steps: Steps) -> StructureModel:
@@ -90,7 +90,7 @@ def build_structure(comm: MPI.Comm, request: StructureInput, pulses: list[float]
     return model, steps
 
 
-def read_structure(comm: MPI.Comm, request: StructureInput) -> tuple[MeshData | None, StructureTables]:
+def _read_structure(comm: MPI.Comm, request: StructureInput) -> tuple[MeshData | None, StructureTables]:
     """Read the mesh and build its tables on rank 0; the mesh is None on other ranks; collective."""
 
     def read() -> tuple[MeshData, StructureTables] | None:
@@ -103,7 +103,7 @@ def read_structure(comm: MPI.Comm, request: StructureInput) -> tuple[MeshData | 
     return (structure[0] if structure else None), comm.bcast(structure[1] if structure else None)
 
 
-def choose_steps(comm: MPI.Comm, rank_elements: RankElements, request: StructureInput, pulses: list[float]) -> Steps:
+def _choose_steps(comm: MPI.Comm, rank_elements: RankElements, request: StructureInput, pulses: list[float]) -> Steps:
     """Choose the time steps of the run's solver; collective."""
     if request.implicit:
         return implicit_steps(comm, rank_elements, request.dynamics, pulses)
@@ -137,7 +137,7 @@ def divide_on_one_rank(request: StructureInput) -> DividedModels[StructureTables
     assert coupling is not None
     whole = tie_layers(read_mesh(request.mesh), request)
     elements = survey(whole.mesh, request.part_materials, treatment_of(request))
-    fine = choose_fine_layers(whole, elements, coupling)
+    fine = _choose_fine_layers(whole, elements, coupling)
     rules = Rules(
         coupling=coupling,
         coarse=whole.mesh.in_parts(lambda name: name not in fine),
@@ -148,9 +148,9 @@ def divide_on_one_rank(request: StructureInput) -> DividedModels[StructureTables
     )
     division = divide(whole, elements, rules)
     check_division(whole, elements, division, rules)
-    check_pulses(request, division.plan.window)
+    _check_pulses(request, division.plan.window)
     inputs = split(whole, structure_tables(whole, request), division)
-    check_motions_at_interface(division, inputs["macro"].tables, request)
+    _check_motions_at_interface(division, inputs["macro"].tables, request)
     return DividedModels(
         meshes={role: item.mesh for role, item in inputs.items()},
         tables={role: item.tables for role, item in inputs.items()},
@@ -163,7 +163,7 @@ def divide_on_one_rank(request: StructureInput) -> DividedModels[StructureTables
     )
 
 
-def check_pulses(request: StructureInput, window: float) -> None:
+def _check_pulses(request: StructureInput, window: float) -> None:
     """Check that no pulse is shorter than a window [s], which the macro model could not resolve.
 
     Raises:
@@ -178,7 +178,7 @@ def check_pulses(request: StructureInput, window: float) -> None:
             )
 
 
-def check_motions_at_interface(division: Division, tables: StructureTables, request: StructureInput) -> None:
+def _check_motions_at_interface(division: Division, tables: StructureTables, request: StructureInput) -> None:
     """Check that no prescribed motion acts on interface nodes that the meso model carries.
 
     Raises:
@@ -194,7 +194,7 @@ def check_motions_at_interface(division: Division, tables: StructureTables, requ
                 )
 
 
-def choose_fine_layers(whole: Whole, elements: Survey, coupling: LayerCoupling) -> tuple[str, ...]:
+def _choose_fine_layers(whole: Whole, elements: Survey, coupling: LayerCoupling) -> tuple[str, ...]:
     """Return the fine layers: the ones named in the input or, without names, the ones with small critical steps.
 
     Raises:

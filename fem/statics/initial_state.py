@@ -120,13 +120,13 @@ def with_initial_stress(
         change: Temperature change [K].
         path: Whether an element of any model yields or has finite rotations.
     """
-    initial = mean_stress(body, materials, displacement, change)
-    begin = partial(set_initial_points, materials=materials, displacement=displacement, change=change)
+    initial = _mean_stress(body, materials, displacement, change)
+    begin = partial(_set_initial_points, materials=materials, displacement=displacement, change=change)
     body = replace(body, initial_stress=initial, begin=begin)
-    return with_initial_forces(body, materials, displacement, change) if path else body
+    return _with_initial_forces(body, materials, displacement, change) if path else body
 
 
-def mean_stress(
+def _mean_stress(
     body: Body, materials: Sequence[Material], displacement: NDArray[np.float64], change: float
 ) -> NDArray[np.float64]:
     """Return the elastic mean stress of all elements after a temperature change [K], shape (ne, 6) [Pa]."""
@@ -136,7 +136,7 @@ def mean_stress(
     return element_stress(body.geometry.gradient, elements.elasticity[elements.material], straining)
 
 
-def with_initial_forces(
+def _with_initial_forces(
     body: Body, materials: Sequence[Material], displacement: NDArray[np.float64], change: float
 ) -> Body:
     """Return a body whose elements carry their initial stress, without resultants at the interface; collective."""
@@ -145,16 +145,16 @@ def with_initial_forces(
     for term in body.terms:
         if isinstance(term, NonlinearElements):
             chosen[term.numbers] = False
-            set_initial_points(term, materials, displacement, change)
+            _set_initial_points(term, materials, displacement, change)
     expanding = thermal_force(body, chosen, materials, change)
-    suppressed = expansion_energy(body, chosen, materials, change)
-    pretension = pretension_of(linear, displacement, expanding, suppressed)
+    suppressed = _expansion_energy(body, chosen, materials, change)
+    pretension = _pretension_of(linear, displacement, expanding, suppressed)
     terms = [*body.terms, pretension]
-    balance_interface(body, terms, pretension)
+    _balance_interface(body, terms, pretension)
     return replace(body, terms=terms)
 
 
-def set_initial_points(
+def _set_initial_points(
     term: NonlinearElements, materials: Sequence[Material], displacement: NDArray[np.float64], change: float
 ) -> None:
     """Set stress and plastic strain at the integration points of path-dependent elements, padding lanes included."""
@@ -168,7 +168,7 @@ def set_initial_points(
         view_by_lane(term.history["slip"])[...] = -in_modes(points.stretched)[order]
 
 
-def expansion_energy(body: Body, chosen: NDArray[np.bool_], materials: Sequence[Material], change: float) -> float:
+def _expansion_energy(body: Body, chosen: NDArray[np.bool_], materials: Sequence[Material], change: float) -> float:
     """Return the elastic energy of suppressed thermal expansion of selected elements, shape (ne,) [J]."""
     strain = np.zeros((len(materials), 6))
     strain[:, :3] = free_expansion(materials, change)
@@ -176,7 +176,7 @@ def expansion_energy(body: Body, chosen: NDArray[np.bool_], materials: Sequence[
     return float(density[chosen] @ body.geometry.volume[chosen])
 
 
-def pretension_of(
+def _pretension_of(
     linear: Sequence[ForceTerm],
     displacement: NDArray[np.float64],
     expanding: NDArray[np.float64],
@@ -197,7 +197,7 @@ def pretension_of(
     return Pretension(-force - expanding, stored)
 
 
-def balance_interface(body: Body, terms: Sequence[ForceTerm], pretension: Pretension) -> None:
+def _balance_interface(body: Body, terms: Sequence[ForceTerm], pretension: Pretension) -> None:
     """Adjust the pretension so that the initial forces at interface nodes add up to zero; collective."""
     rest, force = np.zeros_like(pretension.force), np.zeros_like(pretension.force)
     for term in terms:

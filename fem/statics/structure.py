@@ -155,7 +155,7 @@ class ThermalStructure:
             AgreedError: The mesh does not fit the pads or the materials, or memory ran out; on every rank.
         """
         mesh = agreed(comm, lambda: connect_board(read_mesh(assembly.mesh)) if comm.rank == 0 else None)
-        placed = agreed(comm, lambda: tabulate(mesh, assembly) if mesh else None)
+        placed = agreed(comm, lambda: _tabulate(mesh, assembly) if mesh else None)
         return cls(comm, comm.bcast(placed), mesh, assembly)
 
     @property
@@ -180,7 +180,7 @@ class ThermalStructure:
         displacement = (temperature - self._thermal.reference) * self._kelvin + self._sag
         load = self._weight
         if self._thermal.effects.solder_force != "off" and np.any(wrenches):
-            force = (self._pads.T @ with_board_support(wrenches).ravel()).reshape(-1, 3)
+            force = (self._pads.T @ _with_board_support(wrenches).ravel()).reshape(-1, 3)
             displacement += self._levelled(force)
             load = load + self._load(force)
         displacement, corner_force = self._corners.move(displacement, corner, load)
@@ -212,14 +212,14 @@ class ThermalStructure:
         return whole
 
 
-def with_board_support(wrenches: NDArray[np.float64]) -> NDArray[np.float64]:
+def _with_board_support(wrenches: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return wrenches, shape (joints, 2, 6), plus the supporting force below the board's pads."""
     supported = wrenches.copy()
     supported[:, 0, 2] -= wrenches[:, 0, 2].mean()
     return supported
 
 
-def tabulate(mesh: MeshData, assembly: Assembly) -> PlacedPads:
+def _tabulate(mesh: MeshData, assembly: Assembly) -> PlacedPads:
     """Determine supports, pads and corners of a mesh.
 
     Raises:

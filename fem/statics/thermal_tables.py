@@ -102,9 +102,9 @@ def thermal_tables(mesh: MeshData, centre: NDArray[np.float64]) -> ThermalTables
     Raises:
         MeshError: Board or package is missing, or they share nodes.
     """
-    package = find_package_nodes(mesh)
+    package = _find_package_nodes(mesh)
     held = held_components(mesh, SYMMETRY)
-    held[find_resting_nodes(mesh), 2] = True
+    held[_find_resting_nodes(mesh), 2] = True
     motions = []
     for nodes in (np.flatnonzero(~package), np.flatnonzero(package)):
         points = mesh.points[nodes]
@@ -116,7 +116,7 @@ def thermal_tables(mesh: MeshData, centre: NDArray[np.float64]) -> ThermalTables
     return ThermalTables.undivided(whole, held, package=package, motions=(motions[0], motions[1]))
 
 
-def find_package_nodes(mesh: MeshData) -> NDArray[np.bool_]:
+def _find_package_nodes(mesh: MeshData) -> NDArray[np.bool_]:
     """Return whether a node belongs to the package, shape (n,); raises as ``thermal_tables``."""
     of_board = mesh.in_parts(BOARD_PARTS.__contains__)
     if of_board.all() or not of_board.any():
@@ -129,7 +129,7 @@ def find_package_nodes(mesh: MeshData) -> NDArray[np.bool_]:
     return package
 
 
-def find_resting_nodes(mesh: MeshData) -> NDArray[np.intp]:
+def _find_resting_nodes(mesh: MeshData) -> NDArray[np.intp]:
     """Return one node at the lower end of each mounting hole, the nearest to the centre of the board, shape (k,)."""
     nodes = mesh.facet_nodes("mounting_holes")
     if not len(nodes):

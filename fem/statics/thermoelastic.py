@@ -97,7 +97,7 @@ class Thermoelastic:
         self.body = make_body(comm, rank_elements, tables, np.ones(len(rank_elements.steps)), None)
         self.space = RigidSpace.of(comm, self.body, tables)
         _, assigned = materials_of_parts(tables.part_names, materials)
-        self.expansion = expansion_force(self.body, np.array([material.expansion for material in assigned]))
+        self.expansion = _expansion_force(self.body, np.array([material.expansion for material in assigned]))
         self._equations = Equations.of(comm, self.body)
         self._factor = Factorisation(self._equations.stiffness())
         self._right = self._equations.vector(self.expansion)
@@ -126,7 +126,7 @@ class Thermoelastic:
         return self.space.still(result)
 
 
-def expansion_force(body: Body, expansion: NDArray[np.float64]) -> NDArray[np.float64]:
+def _expansion_force(body: Body, expansion: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the nodal forces of thermal expansion per kelvin, shape (n, 3) [N/K]; collective.
 
     Args:

@@ -120,9 +120,14 @@ class Body:
 
 
 def particle_volumes(cloud: Cloud, volume: float) -> Floats:
-    """Return each particle's share of a volume [m^3], shape (n,).
+    """Return each particle's share of a volume, shape (n,) [m^3]; the shares sum to the volume.
 
-    A particle inside has a whole cell, one on the surface or a wall half a cell, one on a contact line a quarter.
+    A particle inside has a whole cell, one on the surface or a wall half a cell, one on a contact line a quarter;
+    planes of symmetry halve it, too.
+
+    Args:
+        cloud: Particles of the body.
+        volume: Volume of the computed part of the body [m^3].
     """
     on_surface = np.arange(len(cloud.points)) < cloud.surface_count
     part = symmetry.share(cloud) * np.where(on_surface, 0.5, 1.0) * np.where(cloud.wall >= 0, 0.5, 1.0)

@@ -45,6 +45,9 @@ def sort_into_cells(points: Floats, origin: Floats, size: float, shape: Indices)
         origin: Lowest corner of the grid, shape (3,) [m].
         size: Edge length of a cell [m].
         shape: Number of cells along x, y and z, shape (3,).
+
+    Returns:
+        Sorted points with the start of each cell; cells are numbered with z fastest.
     """
     starts, permutation, coordinates = _counting_sort(points, origin, size, shape, get_num_threads())
     return CellList(starts, permutation, coordinates, origin, size, shape)
@@ -81,7 +84,14 @@ def _counting_sort(points, origin, size, shape, parts):
 
 @uncounted
 def cell_of(point, origin, size, shape):
-    """Return the indices (x, y, z) of the cell that contains a point, or of the nearest cell if it is outside."""
+    """Return the indices (x, y, z) of the cell that contains a point, or of the nearest cell if it is outside.
+
+    Args:
+        point: Coordinates, shape (3,) [m].
+        origin: Lowest corner of the grid, shape (3,) [m].
+        size: Edge length of a cell [m].
+        shape: Number of cells along x, y and z, shape (3,).
+    """
     x = min(max(int((point[0] - origin[0]) / size), 0), shape[0] - 1)
     y = min(max(int((point[1] - origin[1]) / size), 0), shape[1] - 1)
     z = min(max(int((point[2] - origin[2]) / size), 0), shape[2] - 1)
@@ -90,7 +100,12 @@ def cell_of(point, origin, size, shape):
 
 @njit(cache=True)
 def extent(points):
-    """Return the lowest and the highest coordinates of points (n, 3), and the number of points that are not finite."""
+    """Return the extent of points, shape (n, 3), and the number of points that are not finite.
+
+    Returns:
+        Lowest coordinates (x, y, z), highest coordinates (x, y, z), and number of points with an infinite coordinate or
+        NaN.
+    """
     (low_x, low_y, low_z), (high_x, high_y, high_z), not_finite = (inf, inf, inf), (-inf, -inf, -inf), 0
     for i in range(points.shape[0]):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]

@@ -31,7 +31,15 @@ class CellGrid(NamedTuple):
 
 
 def loop_over(function: Callable[[int, Any], None], **options: Any) -> Any:
-    """Return a CUDA kernel ``(count, arguments)`` that calls ``function(i, arguments)`` for i from 0 to count - 1."""
+    """Return a CUDA kernel ``(count, arguments)`` that calls ``function(i, arguments)`` for i from 0 to count - 1.
+
+    Args:
+        function: CUDA device function of an index and a tuple of arguments.
+        options: Options of ``numba.cuda.jit``.
+
+    Returns:
+        Kernel, run by ``launch``.
+    """
 
     @cuda.jit(**options)
     def run(count, arguments):
@@ -43,21 +51,32 @@ def loop_over(function: Callable[[int, Any], None], **options: Any) -> Any:
 
 
 def blocks_for(count: int) -> int:
-    """Return the number of thread blocks of a loop over ``count`` items."""
+    """Return the number of blocks of ``THREADS_PER_BLOCK`` threads for a loop over ``count`` items."""
     return max(1, -(-count // THREADS_PER_BLOCK))
 
 
 def launch(kernel: Any, count: int, *arguments: Any) -> None:
-    """Run a kernel of ``loop_over`` with these arguments; an empty loop is not launched."""
+    """Run a kernel of ``loop_over`` on the device; an empty loop is not launched.
+
+    Args:
+        kernel: Kernel that ``loop_over`` returned.
+        count: Number of items.
+        arguments: Arguments that the function of the loop gets as a tuple.
+    """
     if count:
         kernel[blocks_for(count), THREADS_PER_BLOCK](count, arguments)
 
 
 @njit
 def raise_to(values, i, value):
-    """Set ``values[i]`` to the larger of itself and ``value``, atomically.
+    """Set ``values[i]`` to the larger of itself and ``value``, atomically, within a CUDA kernel.
 
     The simulator replaces ``cuda`` only in the module of ``loop_over``, so loops of other modules call this function.
+
+    Args:
+        values: Device array, changed in place.
+        i: Index.
+        value: Scalar.
     """
     cuda.atomic.max(values, i, value)
 

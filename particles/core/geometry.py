@@ -32,7 +32,7 @@ class JointGeometry:
 
 
 def joint_counts(geometry: JointGeometry, volume: float, spacing: float) -> tuple[int, int]:
-    """Return the number of concentric rings in a layer of a joint's cloud and the number of layers.
+    """Return the number of concentric rings in a layer of a joint's cloud and the number of layers, in this order.
 
     Layers are sqrt(3)/2 spacings apart, so that the surface triangles are nearly equilateral.
 

@@ -50,9 +50,12 @@ def write_near(point, limits, radius, cells, row):
     Args:
         point: Coordinates (x, y, z) [m].
         limits: Number of a point that is left out (-1 for none), and the number from which on all are left out.
-        radius: Search radius [m].
-        cells: ``CellList`` of the points.
-        row: Output, shape (room,); its last entry may be overwritten by a point that is too far away.
+        radius: Search radius, a scalar [m].
+        cells: ``CellList`` of the points, with cells at least as large as the radius.
+        row: Output, integers, shape (room,); its last entry may be overwritten by a point that is too far away.
+
+    Returns:
+        Number of points within the radius, possibly more than ``room``.
     """
     starts, numbers, coordinates, shape = cells.starts, cells.permutation, cells.coordinates, cells.shape
     x, y, z = point[0], point[1], point[2]

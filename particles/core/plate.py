@@ -91,7 +91,12 @@ def joint_plates(geometry: JointGeometry) -> tuple[Plate, Plate]:
 
 
 def placed_geometry(geometry: JointGeometry, plates: Sequence[Plate]) -> JointGeometry:
-    """Return the geometry of a joint whose plates have moved, in the frame of the board's plate."""
+    """Return the geometry of a joint whose plates have moved, in the frame of the board's plate.
+
+    Args:
+        geometry: Geometry of the joint, whose radii are kept.
+        plates: Present plates of board and package.
+    """
     board, package = plates
     x, y, gap = map(float, board.local(package.origin[None])[0])
     rotation = Rotation.from_matrix(board.frame @ package.frame.T).as_rotvec()
@@ -102,12 +107,12 @@ def slide(plates: Sequence[Plate], wall: NDArray[np.int8], field: Floats) -> Flo
     """Remove the normal component of vectors at particles on plates.
 
     Args:
-        plates: Plates.
-        wall: Index of the plate of each vector, -1 for none, shape (k,).
-        field: Vectors, shape (k, 3).
+        plates: Plates, e.g. of a body, numbered from 0.
+        wall: Number of the plate of each vector, -1 for none, shape (k,).
+        field: Vectors, shape (k, 3); not changed.
 
     Returns:
-        Tangential vectors, shape (k, 3).
+        Tangential vectors, shape (k, 3); vectors without a plate as they are.
     """
     result = field.copy()
     for number, plate in enumerate(plates):

@@ -20,7 +20,7 @@ ALL_WAYS = 0.7
 
 @njit(cache=True)
 def area_vector(points, i, j, k):
-    """Return the normal of a triangle, with twice its area as length [m^2]."""
+    """Return the normal (x, y, z) of the triangle of points i, j, k of (n, 3), with twice its area as length [m^2]."""
     ux, uy, uz = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1], points[j, 2] - points[i, 2]
     vx, vy, vz = points[k, 0] - points[i, 0], points[k, 1] - points[i, 1], points[k, 2] - points[i, 2]
     return uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
@@ -28,7 +28,12 @@ def area_vector(points, i, j, k):
 
 @njit(cache=True)
 def surface_area(points, triangles):
-    """Return the total area of triangles (t, 3) of points (n, 3) [m^2]."""
+    """Return the total area of triangles, a scalar [m^2].
+
+    Args:
+        points: Positions, shape (n, 3) [m].
+        triangles: Triangles, shape (t, 3).
+    """
     total = 0.0
     for t in range(triangles.shape[0]):
         x, y, z = area_vector(points, triangles[t, 0], triangles[t, 1], triangles[t, 2])
@@ -38,7 +43,12 @@ def surface_area(points, triangles):
 
 @njit(cache=True)
 def triangle_areas(points, triangles):
-    """Return the area of each triangle, shape (t,) [m^2]."""
+    """Return the area of each triangle, shape (t,) [m^2].
+
+    Args:
+        points: Positions, shape (n, 3) [m].
+        triangles: Triangles, shape (t, 3).
+    """
     result = np.empty(triangles.shape[0])
     for t in range(triangles.shape[0]):
         x, y, z = area_vector(points, triangles[t, 0], triangles[t, 1], triangles[t, 2])
@@ -50,7 +60,11 @@ def area_gradient(points: Floats, triangles: Indices, weights: Floats | None = N
     """Return the gradient of ``surface_area`` with respect to each point, shape (n, 3) [m].
 
     It equals K x with the stiffness matrix of ``cotangent_laplacian``; degenerate triangles contribute nothing.
-    ``weights`` (t,) multiply the areas of triangles.
+
+    Args:
+        points: Positions, shape (n, 3) [m].
+        triangles: Triangles, shape (t, 3).
+        weights: Factors of the areas of triangles, shape (t,); None for 1.
     """
     return _area_gradient(points, triangles, np.ones(len(triangles)) if weights is None else weights)
 
@@ -131,12 +145,22 @@ def _area_vector(points: Floats, ring: Indices) -> Floats:
 
 
 def ring_area(points: Floats, ring: Indices) -> float:
-    """Return the area of the plane polygon of a contact line [m^2]."""
+    """Return the area of the plane polygon of a contact line [m^2].
+
+    Args:
+        points: Positions, shape (n, 3) [m].
+        ring: Vertices of the contact line in order, counter-clockwise seen from +z, shape (k,).
+    """
     return float(np.linalg.norm(_area_vector(points, ring)))
 
 
 def ring_area_gradient(points: Floats, ring: Indices) -> Floats:
-    """Return the gradient of ``ring_area`` with respect to the vertices of the ring, shape (k, 3) [m]."""
+    """Return the gradient of ``ring_area`` with respect to the vertices of the ring, shape (k, 3) [m].
+
+    Args:
+        points: Positions, shape (n, 3) [m].
+        ring: Vertices of the contact line in order, counter-clockwise seen from +z, shape (k,).
+    """
     x, normal = points[ring], _area_vector(points, ring)
     normal /= np.linalg.norm(normal)
     return 0.5 * np.cross(ahead(x) - behind(x), normal)
@@ -183,7 +207,12 @@ def volume_and_gradient(
 
 
 def centre_of_volume(points: Floats, triangles: Indices) -> Floats:
-    """Return the centre of the volume in a closed surface, shape (3,) [m], by tetrahedra with the origin."""
+    """Return the centre of the volume in a closed surface, shape (3,) [m], by tetrahedra with the origin.
+
+    Args:
+        points: Vertices, shape (n, 3) [m].
+        triangles: Outward oriented triangles, shape (t, 3).
+    """
     corner = points[triangles]
     volumes = np.einsum("td,td->t", corner[:, 0], np.cross(corner[:, 1], corner[:, 2])) / 6.0
     return (volumes @ corner.sum(axis=1)) / (4.0 * volumes.sum())
@@ -217,7 +246,12 @@ def enclosed_volume(points: Floats, triangles: Indices, rings: Sequence[Indices]
 
 @njit(cache=True)
 def cotangents(points, triangles):
-    """Return the cotangent of the angle at each corner of each triangle, shape (t, 3)."""
+    """Return the cotangent of the angle at each corner of each triangle, shape (t, 3).
+
+    Args:
+        points: Positions, shape (n, 3) [m].
+        triangles: Triangles, shape (t, 3); column c of the result belongs to corner c.
+    """
     result = np.empty(triangles.shape)
     for t in range(triangles.shape[0]):
         for k in range(3):
@@ -235,6 +269,11 @@ def cotangent_laplacian(points: Floats, triangles: Indices, size: int) -> sparse
 
     K is symmetric and positive semidefinite; K x is exactly the gradient of the area of the triangulation
     (Pinkall & Polthier 1993).
+
+    Args:
+        points: Positions, shape (n, 3) [m].
+        triangles: Triangles, shape (t, 3).
+        size: Number of rows, larger than the largest vertex number; rows of other points are empty.
     """
     half = 0.5 * cotangents(points, triangles)
     i, j = np.roll(triangles, -1, axis=1).ravel(), np.roll(triangles, -2, axis=1).ravel()

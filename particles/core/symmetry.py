@@ -49,12 +49,21 @@ def _arc(ring: NDArray[np.int32], is_inside: NDArray[np.bool_]) -> NDArray[np.in
 
 
 def on_plane(cloud: Cloud, axis: int) -> NDArray[np.bool_]:
-    """Return whether each particle is on a plane of symmetry, shape (n,); it then stays there exactly."""
+    """Return whether each particle of a cloud is on a plane of symmetry, shape (n,); it then stays there exactly.
+
+    Args:
+        cloud: Cloud of the computed part.
+        axis: 0 for the plane x = 0, 1 for y = 0.
+    """
     return cloud.points[:, axis] == 0.0
 
 
 def surface_planes(cloud: Cloud) -> list[tuple[int, NDArray[np.int32]]]:
-    """Return the axis of each plane of symmetry and the vertices of the free surface on it."""
+    """Return the vertices of the free surface on each plane of symmetry.
+
+    Returns:
+        Axis of the plane (0 for x = 0, 1 for y = 0) and vertex numbers, shape (k,), for each plane.
+    """
     surface = {axis: on_plane(cloud, axis)[: cloud.surface_count] for axis in cloud.symmetry}
     return [(axis, np.flatnonzero(on).astype(np.int32)) for axis, on in surface.items()]
 
@@ -68,12 +77,12 @@ def share(cloud: Cloud) -> Floats:
 
 
 def fold(cloud: Cloud, field: Floats, first: int = 0) -> Floats:
-    """Remove the normal component of vectors at particles on planes of symmetry.
+    """Return vectors without their normal components at particles on planes of symmetry, shape (k, 3).
 
     Args:
         cloud: Cloud of the computed part.
-        field: Vectors at consecutive particles, shape (k, 3).
-        first: Particle of the first vector.
+        field: Vectors at consecutive particles, shape (k, 3); not changed.
+        first: Number of the particle of the first vector.
     """
     result = field.copy()
     for axis in cloud.symmetry:
@@ -93,6 +102,9 @@ def whole_points(cloud: Cloud, points: Floats, wall: int) -> tuple[Floats, Indic
         cloud: Cloud of the computed part.
         points: Positions of its particles, shape (n, 3) [m].
         wall: Index of the contact line.
+
+    Returns:
+        Positions along the closed line, shape (m, 3) [m], and the index of each in the ring of the cloud, shape (m,).
     """
     ring = cloud.rings[wall]
     index, signs = whole_line(cloud, len(ring))

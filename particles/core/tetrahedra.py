@@ -40,7 +40,12 @@ def boundary_triangles(cells: Indices) -> Indices:
 
 
 def cell_volumes(points: Floats, cells: Indices) -> Floats:
-    """Return the signed volumes of tetrahedra (t, 4) with corners among points (n, 3) [m], shape (t,) [m^3]."""
+    """Return the signed volumes of tetrahedra, shape (t,) [m^3].
+
+    Args:
+        points: Corners, shape (n, 3) [m].
+        cells: Tetrahedra, shape (t, 4); negative orientation gives a negative volume.
+    """
     edges = points[cells[:, 1:]] - points[cells[:, :1]]
     return np.einsum("td,td->t", edges[:, 0], np.cross(edges[:, 1], edges[:, 2])) / 6.0
 
@@ -49,6 +54,10 @@ def volume_gradients(points: Floats, cells: Indices) -> Floats:
     """Return the gradients of the volumes of tetrahedra with respect to their corners, shape (t, 4, 3) [m^2].
 
     They are the volume times the gradients of the linear shape functions.
+
+    Args:
+        points: Corners, shape (n, 3) [m].
+        cells: Tetrahedra, shape (t, 4).
     """
     edges = points[cells[:, 1:]] - points[cells[:, :1]]
     inner = np.cross(np.roll(edges, -1, axis=1), np.roll(edges, -2, axis=1)) / 6.0
@@ -56,5 +65,9 @@ def volume_gradients(points: Floats, cells: Indices) -> Floats:
 
 
 def thick_cells(volumes: Floats) -> NDArray[np.int64]:
-    """Return the tetrahedra whose volumes (t,) are large enough for a gradient."""
+    """Return the numbers of the tetrahedra that are large enough for a gradient, shape (k,).
+
+    Args:
+        volumes: Volumes, shape (t,) [m^3]; small ones are so in relation to their mean.
+    """
     return np.flatnonzero(volumes > SMALLEST_VOLUME * volumes.mean())

@@ -62,14 +62,14 @@ def _nodes_across(points, corners, axis, origin, spacing):
 
 @njit(cache=True)
 def on_grid(points, triangles, origin, spacing, numbers):
-    """Compute the winding numbers of a surface at the nodes of a grid.
+    """Add the winding numbers of a closed surface at the nodes of a grid to an array.
 
     Args:
         points: Vertices, shape (n, 3) [m].
         triangles: Outward oriented triangles, shape (t, 3).
         origin: Position of the first node, shape (3,) [m].
-        spacing: Distance between nodes [m].
-        numbers: Zeros, shape (i, j, k), to which the winding numbers are added.
+        spacing: Distance between nodes, a scalar [m].
+        numbers: Integers, zero at first, shape (i, j, k) along x, y and z; 1 inside and 0 outside afterwards.
     """
     last_x, last_y, last_z = numbers.shape[0] - 1, numbers.shape[1] - 1, numbers.shape[2] - 1
     for t in range(triangles.shape[0]):

@@ -92,14 +92,16 @@ def tank_columns(scene: DamBreak) -> int:
 
 
 def dam_metrics(scene: DamBreak, history: dict[str, Floats]) -> Metrics:
-    """Compute the metrics of a dam break: wave arrival, plateau pressure, second rise, and rise of the energy.
+    """Compute the metrics of a dam break.
 
     Args:
         scene: Dam break.
-        history: Column name -> samples over time, SI values.
+        history: Samples over time, shape (n,), in the columns ``time`` [s], ``sensor_pressure`` [Pa],
+            ``kinetic_energy``, ``potential_energy`` and ``elastic_energy``.
 
     Returns:
-        Metric name -> (value, unit); nan for events after the end of the run.
+        Value and unit of ``impact_onset`` and ``second_rise`` in sqrt(H/g), ``plateau_mean`` in rho g H, and
+        ``energy_rise``, the largest rise of the total energy over the initial one; nan for events after the end.
     """
     time = history["time"] / scene.unit_of_time
     pressure = history["sensor_pressure"] / (scene.density * scene.gravity * scene.height)

@@ -20,7 +20,15 @@ RESIDUAL_FILM = 0.79
 
 
 def impact_texts(scene: Droplet, history: Mapping[str, Floats]) -> dict[str, str]:
-    """Describe an impact: name -> text on its outcome, the film thickness, and the expected spread if known."""
+    """Describe an impact in words.
+
+    Args:
+        scene: Droplet.
+        history: Samples over time; the columns ``foot``, ``parts`` and ``shed`` are used.
+
+    Returns:
+        Texts ``outcome``, ``film`` (its thickness) and, where correlations are valid, ``spread_expected``.
+    """
     return {"outcome": outcome(history), "film": _film_text(scene)} | _expected_texts(scene)
 
 
@@ -68,7 +76,12 @@ def base_width(points: Floats, spacing: float) -> float:
 
 
 def outcome(history: Mapping[str, Floats]) -> str:
-    """Return the outcome of an impact in words, from its history."""
+    """Return the outcome of an impact in words, e.g. "stays on the wall" or "rebounds, sheds satellites".
+
+    Args:
+        history: Samples over time, shape (n,): ``foot`` (wetted diameter, 0 off the wall), ``parts`` (number of parts)
+            and ``shed`` (number of detachments so far).
+    """
     wets, in_parts = history["foot"] > 0.0, history["parts"][-1] > 1.0
     if not wets.any():
         return "does not touch the wall"
@@ -93,6 +106,14 @@ def droplet_metrics(scene: Droplet, history: dict[str, Floats]) -> Metrics:
     ``surface_volume_drift`` is the largest change of the enclosed volume, with the spray, at any sample: mesh
     smoothing, every few steps, resets it to the volume of the particles. ``parts_shed`` counts events in which one or
     more parts detach.
+
+    Args:
+        scene: Droplet.
+        history: Samples over time, shape (n,), in the columns of a droplet's run.
+
+    Returns:
+        Metric name -> (value, unit): always drift, spray and Capillary and Ohnesorge numbers; pressure and roundness of
+        a free drop, or base and height over the diameter on a wall; for impacts also spread, film and contact time.
     """
     late = history["time"] >= 0.9 * history["time"][-1]
     mean = {name: float(column[late].mean()) for name, column in history.items()}

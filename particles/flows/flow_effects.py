@@ -100,7 +100,7 @@ FLOW_EFFECTS = (FlowViscosity(), ArtificialViscosity(), ShearDependence())
 
 
 def sph_numerics(scene: FlowScene) -> MethodNumerics:
-    """Return the numerical parameters of a flow by delta-SPH."""
+    """Return the numerical parameters of a flow by delta-SPH; the scene must use this method, which is not checked."""
     return cast(MethodNumerics, scene.numerics)
 
 
@@ -118,7 +118,12 @@ def artificial_viscosity(scene: FlowScene) -> float:
 
 
 def decide_flow(scene: FlowScene) -> dict[str, Decision]:
-    """Decide on all effects of a flow, the common and the specific ones: name -> decision."""
+    """Decide on all effects of a flow, the common and the specific ones of its scene.
+
+    Returns:
+        Effect name -> state ``on``, reason ``why`` and, if predicted, ``influence``; only effects of the scene's
+        method.
+    """
     method = scene.numerics.method
     effects = [effect for effect in FLOW_EFFECTS if not effect.methods or method in effect.methods]
     return decide_all(effects, scene.unit_scene) | scene.decide_own_effects()

@@ -7,11 +7,11 @@ from reflowshock.arrays import Floats
 
 
 def lattice(columns: NDArray[np.integer], rows: NDArray[np.integer], spacing: float) -> Floats:
-    """Return the points of a square lattice in the xz plane, shape (3, n) [m].
+    """Return the points of a square lattice in the plane y = 0, shape (3, n) [m].
 
     Args:
-        columns: Indices along x.
-        rows: Indices along z.
+        columns: Indices along x; index i gives x = (i + 1/2) spacing.
+        rows: Indices along z, which vary fastest.
         spacing: Distance between neighbouring points [m].
     """
     x, z = np.meshgrid(columns + 0.5, rows + 0.5, indexing="ij")

@@ -38,7 +38,7 @@ class HasMethod(Protocol):
 
 
 def computes(scene: HasMethod) -> bool:
-    """Return whether the method of a scene computes this kind of flow."""
+    """Return whether the numerical method that a scene selects has a solver for this kind of flow."""
     return type(scene).__name__ in SOLVERS[scene.numerics.method]
 
 
@@ -47,10 +47,14 @@ def solve_flow(scene: HasMethod, progress: Callable[[float], None], checkpoint: 
 
     Args:
         scene: Parameters of the flow.
-        progress: Function called with the completed fraction.
-        checkpoint: Checkpoint to continue from and to write.
+        progress: Function called with the completed fraction, 0 to 1.
+        checkpoint: Checkpoint to continue from, if its file exists, and to write.
+
+    Returns:
+        Pictures, history and metrics of the flow.
 
     Raises:
         FloatingPointError: A position is not finite.
+        KeyError: The method has no solver for this kind of flow; see ``computes``.
     """
     return resolve_name(SOLVERS[scene.numerics.method][type(scene).__name__])(scene, progress, checkpoint)

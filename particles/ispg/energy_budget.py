@@ -43,7 +43,7 @@ class EnergyLosses:
 
 
 def total_losses(losses: Sequence[EnergyLosses]) -> EnergyLosses:
-    """Return the sum of the losses of several flows, cause by cause."""
+    """Return the sum of the energy losses [J] of several flows, cause by cause."""
     return EnergyLosses(*(sum(getattr(part, entry.name) for part in losses) for entry in fields(EnergyLosses)))
 
 

@@ -22,7 +22,7 @@ def supports(rows, points, lists, spacing):
     Args:
         rows: Particles, shape (m,).
         points: Particles and ghosts, shape (n + g, 3) [m].
-        lists: Offsets and indices of the neighbours, and the radius of the search [m].
+        lists: Offsets (n + 1,) and indices (k,) of the neighbours, and the radius of the search, a scalar [m].
         spacing: Particle spacing [m].
 
     Returns:
@@ -79,7 +79,10 @@ def _square_of_the_fewest(points, i, neighbours):
 
 @njit(cache=True)
 def with_rows(lists, rows, others):
-    """Return neighbour lists with some rows replaced; the new rows may contain the particle itself."""
+    """Return neighbour lists, offsets (n + 1,) and indices (k,), with some rows replaced.
+
+    ``others`` has the offsets and indices of the new rows; particles themselves in them are left out.
+    """
     (offsets, indices), (starts, replacements) = lists, others
     number = np.full(offsets.shape[0] - 1, -1)
     for r in range(rows.shape[0]):
@@ -208,7 +211,10 @@ def shape_rows(points, lists, squares, starts, shares):
 
 @njit(cache=True)
 def values(starts, columns, weights, field):
-    """Return N f at the particles, shape (n, d), of a field with ghosts, shape (n + g, d)."""
+    """Return N f at the particles, shape (n, d), of a field f on particles and ghosts, shape (n + g, d).
+
+    The rows ``starts`` (n + 1,), ``columns`` (k,) and ``weights`` (k, 4) are those of ``shape_rows``.
+    """
     result = np.zeros((starts.shape[0] - 1, field.shape[1]))
     for i in range(result.shape[0]):
         for k in range(starts[i], starts[i + 1]):
@@ -219,7 +225,10 @@ def values(starts, columns, weights, field):
 
 @njit(cache=True)
 def spread(starts, columns, weights, parts, source):
-    """Apply the transpose of ``values`` for a scalar that is even at the walls; shapes (n,)."""
+    """Apply the transpose of ``values`` for a scalar that is even at the walls, ``parts`` (n,); return shape (n,).
+
+    ``source`` (g,) is the particle that each ghost mirrors; rows as for ``values``.
+    """
     count = starts.shape[0] - 1
     result = np.zeros(count)
     for i in range(count):
@@ -234,13 +243,13 @@ def lost_power(rows, fields, factors, walls):
     """Return the power in one velocity field of the forces that resist another one.
 
     Args:
-        rows: Starts, columns and weights.
+        rows: Starts (n + 1,), columns (k,) and weights (k, 4) of the shape functions.
         fields: Velocity that causes the forces and velocity in which they act, with ghosts, shape (n + g, 3) [m/s].
         factors: Coefficients of ``resistance``, shape (n, 3).
-        walls: Wall velocities, shape (n, 3) [m/s].
+        walls: Wall velocities at the particles, shape (n, 3) [m/s].
 
     Returns:
-        Power of smoothing, of wall drag and of viscosity [W].
+        Power of smoothing, of wall drag and of viscosity, three scalars [W].
     """
     (starts, columns, weights), (first, second) = rows, fields
     smoothing = sliding = viscous = 0.0
@@ -263,7 +272,7 @@ def lost_power(rows, fields, factors, walls):
 
 @njit(cache=True)
 def velocity_gradient(starts, columns, weights, field):
-    """Return the gradient d v_c / d x_d, shape (n, 3, 3) [1/s], of velocities with ghosts, shape (n + g, 3) [m/s]."""
+    """Return d v_c / d x_d, shape (n, 3, 3) [1/s], of velocities (n + g, 3) [m/s]; rows as for ``values``."""
     count = starts.shape[0] - 1
     gradient = np.empty((count, 3, 3))
     for i in range(count):
@@ -331,7 +340,7 @@ def resistance(starts, columns, weights, field, factors):
 
 @njit(cache=True)
 def divergence(starts, columns, weights, field):
-    """Return the divergence, shape (n,) [1/s], of velocities with ghosts, shape (n + g, 3) [m/s]."""
+    """Return the divergence, shape (n,) [1/s], of velocities with ghosts (n + g, 3) [m/s]; rows as for ``values``."""
     count = starts.shape[0] - 1
     result = np.empty(count)
     for i in range(count):
@@ -345,7 +354,7 @@ def divergence(starts, columns, weights, field):
 
 @njit(cache=True)
 def divergence_transposed(starts, columns, weights, factor, result):
-    """Add the transpose of ``divergence`` times ``factor`` (n,) [N m] to forces with ghosts, shape (n + g, 3) [N]."""
+    """Add the transpose of ``divergence`` times ``factor`` (n,) [N m] to forces ``result``, shape (n + g, 3) [N]."""
     for i in range(starts.shape[0] - 1):
         f = factor[i]
         if f != 0.0:
@@ -358,7 +367,10 @@ def divergence_transposed(starts, columns, weights, factor, result):
 
 @njit(cache=True)
 def reflected(field, source, reflection):
-    """Append the reflected vectors of the ghosts to a vector field, shape (n, 3) to (n + g, 3)."""
+    """Append the reflected vectors of the ghosts to a vector field, shape (n, 3) to (n + g, 3).
+
+    Ghost k mirrors the particle ``source[k]``; ``reflection[k]``, shape (3, 3), maps the vector.
+    """
     count = field.shape[0]
     result = np.empty((count + source.shape[0], 3))
     for i in range(count):
@@ -375,7 +387,7 @@ def reflected(field, source, reflection):
 
 @njit(cache=True)
 def folded(forces, source, reflection):
-    """Apply the transpose of ``reflected`` to forces on particles and ghosts, shape (n + g, 3) to (n, 3) [N]."""
+    """Apply the transpose of ``reflected``: add forces on ghosts to their particles, shape (n + g, 3) to (n, 3) [N]."""
     count = forces.shape[0] - source.shape[0]
     result = forces[:count].copy()
     for g in range(source.shape[0]):

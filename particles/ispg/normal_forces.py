@@ -30,11 +30,11 @@ def has_friction(physics: Physics) -> bool:
 
 
 def tangential_share(gradient: Floats, frequency: float) -> float:
-    """Return the share of the tangential surface force that acts.
+    """Return the share of the tangential surface force that acts, 0 to 1; it grows with the rate of deformation.
 
     Args:
         gradient: Velocity gradient, shape (n, 3, 3) [1/s].
-        frequency: Frequency of the grid's capillary waves [1/s].
+        frequency: Frequency of the grid's capillary waves [1/s]; 0 without surface tension, which gives 1.
     """
     if not frequency:  # no tension, no tangential part
         return 1.0

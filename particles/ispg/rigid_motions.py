@@ -18,7 +18,7 @@ TURN = 5  # index of the rotation about the z axis
 
 
 def admitted_motions(points: Floats, projections: Floats) -> NDArray[np.bool_]:
-    """Return which rigid-body motions the walls admit, shape (6,).
+    """Return which rigid-body motions the walls admit, shape (6,): three translations, then three rotations.
 
     Args:
         points: Particle positions, shape (n, 3) [m].
@@ -84,7 +84,7 @@ def wall_velocities(body: Body, twists: Mapping[int, Floats]) -> Floats:
 
 
 def constrained_part(projections: Floats, field: Floats) -> Floats:
-    """Return the part of a velocity field that the walls do not admit.
+    """Return the part of a velocity field that the walls do not admit, shape (n, 3) [m/s].
 
     Args:
         projections: Projections onto the velocities that walls admit, shape (n, 3, 3).
@@ -131,14 +131,14 @@ def rigid_part(basis: Floats, masses: Floats, velocity: Floats) -> Floats:
 
 
 def with_momenta(motions: Floats, masses: Floats, basis: Floats, velocity: Floats, momenta: Floats) -> Floats:
-    """Return a velocity field corrected to given momenta.
+    """Return a velocity field, shape (n, 3) [m/s], to which rigid-body motions are added so that it has given momenta.
 
     Args:
         motions: Rigid-body motions along which the momenta are prescribed, shape (k, n, 3).
         masses: Particle masses, shape (n,) [kg].
-        basis: Rigid-body motions that are added, shape (k, n, 3).
-        velocity: Velocity, shape (n, 3) [m/s].
-        momenta: Required momenta, shape (k,).
+        basis: Rigid-body motions that are added, as many, shape (k, n, 3).
+        velocity: Velocity before the correction, shape (n, 3) [m/s].
+        momenta: Required momenta, as ``rigid_momenta`` defines them, shape (k,).
     """
     moved = np.array([rigid_momenta(motions, masses, motion) for motion in basis]).T  # by columns
     missing = momenta - rigid_momenta(motions, masses, velocity)

@@ -32,7 +32,15 @@ def check_stencils(body: Body, sound: NDArray[np.bool_], trouble: str) -> None:
 
 @njit(cache=True)
 def factor_spd(matrix, size):
-    """Factor a symmetric positive definite matrix in place (lower triangle); return False if a pivot vanishes."""
+    """Factor a symmetric positive definite matrix in place by Cholesky's method.
+
+    Args:
+        matrix: Square array of at least ``size`` rows; its leading lower triangle is replaced by the factor.
+        size: Number of rows and columns in use.
+
+    Returns:
+        True, or False if a pivot vanishes; the contents are then undefined.
+    """
     floor = 0.0
     for a in range(size):
         floor = max(floor, PIVOT_FLOOR * matrix[a, a])
@@ -50,7 +58,13 @@ def factor_spd(matrix, size):
 
 @njit(cache=True)
 def substitute(factor, right, size):
-    """Solve in place for all columns of ``right`` with a Cholesky factor."""
+    """Solve in place for all columns of the right-hand side with a Cholesky factor.
+
+    Args:
+        factor: Lower triangle of the factor, as ``factor_spd`` leaves it.
+        right: Right-hand sides, shape (size or more, columns), replaced by the solutions.
+        size: Number of equations.
+    """
     for col in range(right.shape[1]):
         for a in range(size):
             for c in range(a):

@@ -44,8 +44,11 @@ def projected_blocks(starts, columns, blocks, frames):
     Args:
         starts: Start of each block row, shape (n + 1,).
         columns: Column of each block, shape (k,).
-        blocks: Blocks, shape (k, 3, 3).
+        blocks: Blocks, shape (k, 3, 3); not changed.
         frames: Matrix of each particle, shape (n, 3, 3).
+
+    Returns:
+        Blocks in the same order, shape (k, 3, 3).
     """
     result, half = np.empty_like(blocks), np.empty((3, 3))
     for i in range(starts.shape[0] - 1):
@@ -66,8 +69,8 @@ def rates_of_volume(rows, images, parts, field):
     """Return B v, the rates of the nodal volumes, shape (n,) [m^3/s].
 
     Args:
-        rows: Shape functions.
-        images: Ghost particles.
+        rows: Shape functions: starts (n + 1,), columns (k,) and weights (k, 4).
+        images: Ghosts: particle that each mirrors (g,) and reflection of its vectors (g, 3, 3).
         parts: Nodal volumes, shape (n,) [m^3], and the gradient they miss, shape (n, 3) [m^2].
         field: Velocity, shape (n, 3) [m/s].
     """
@@ -82,7 +85,14 @@ def rates_of_volume(rows, images, parts, field):
 
 @njit(cache=True)
 def pressure_forces(rows, images, parts, pressure):
-    """Return B^T p, the transpose of ``rates_of_volume``: forces, shape (n, 3) [N], of pressures, shape (n,) [Pa]."""
+    """Return B^T p, the transpose of ``rates_of_volume`` applied to pressures, shape (n, 3) [N].
+
+    Args:
+        rows: Shape functions: starts (n + 1,), columns (k,) and weights (k, 4).
+        images: Ghosts: particle that each mirrors (g,) and reflection of its vectors (g, 3, 3).
+        parts: Nodal volumes, shape (n,) [m^3], and the gradient they miss, shape (n, 3) [m^2].
+        pressure: Pressures at the particles, shape (n,) [Pa].
+    """
     volumes, unbalanced = parts
     forces = np.zeros((volumes.shape[0] + images[0].shape[0], 3))
     divergence_transposed(*rows, volumes * pressure, forces)
@@ -94,8 +104,8 @@ def friction_operator(rows, images, resisted, field):
     """Apply m/dt + V + S to a velocity field and project the force onto admissible directions, shape (n, 3) [N].
 
     Args:
-        rows: Shape functions.
-        images: Ghost particles.
+        rows: Shape functions: starts (n + 1,), columns (k,) and weights (k, 4).
+        images: Ghosts: particle that each mirrors (g,) and reflection of its vectors (g, 3, 3).
         resisted: Masses over the time step, shape (n,) [kg/s]; coefficients of ``resistance``, shape (n, 3);
             projections of the particles, shape (n, 3, 3).
         field: Velocity, shape (n, 3) [m/s].
@@ -115,10 +125,13 @@ def admitted_rates(rows, images, volumes, admitted):
     The correction of nodal integration is left out. A particle and its ghosts make one entry.
 
     Args:
-        rows: Shape functions.
-        images: Ghost particles.
+        rows: Shape functions: starts (n + 1,), columns (k,) and weights (k, 4).
+        images: Ghosts: particle that each mirrors (g,) and reflection of its vectors (g, 3, 3).
         volumes: Nodal volumes, shape (n,) [m^3].
         admitted: Projections onto the velocities that walls admit, shape (n, 3, 3).
+
+    Returns:
+        Start of each row, shape (n + 1,), particle of each entry, shape (e,), and entries, shape (e, 3) [m^2].
     """
     (starts, columns, weights), (source, reflection) = rows, images
     count = starts.shape[0] - 1
@@ -148,10 +161,10 @@ def admitted_rates(rows, images, volumes, admitted):
 
 
 def admitted_stiffness(stiffness: sparse.bsr_matrix, admitted: Floats) -> sparse.bsr_matrix:
-    """Project a stiffness matrix onto the velocities that walls admit.
+    """Project a stiffness matrix onto the velocities that walls admit; return the matrix, shape (3 s, 3 s) [N/m].
 
     Args:
-        stiffness: Stiffness by particle, shape (3 s, 3 s) [N/m].
+        stiffness: Stiffness by particle, shape (3 s, 3 s) [N/m]; not changed.
         admitted: Projections of the particles, the first s of which are used, shape (n, 3, 3).
     """
     blocks = projected_blocks(stiffness.indptr, stiffness.indices, stiffness.data, admitted)

@@ -46,16 +46,23 @@ def problems(solder: Solder, geometries: Mapping[str, JointGeometry], pitch: flo
 
 
 def scheme_problems(solder: Solder) -> list[Problem]:
-    """Find an unsupported time step, basis or wall of the scheme, and an incomplete wall condition."""
+    """Find an unsupported time step, basis or wall of the scheme, and an incomplete wall condition.
+
+    Args:
+        solder: Solder with the selected scheme.
+
+    Returns:
+        Input errors with their keys in the case file; empty if there are none.
+    """
     return _wall_problems(solder) + _time_step_problems(solder) + _basis_problems(solder)
 
 
 def ispg_problems(solder: Solder, place: str | None) -> list[Problem]:
-    """Find the use of the scheme ispg where it is not verified.
+    """Find the use of the scheme ispg where it is not verified; no or one input error.
 
     Args:
-        solder: Solder with the selected scheme.
-        place: Unverified feature of the scene; None if the scheme is verified for it.
+        solder: Solder with the selected scheme; other schemes have no problem.
+        place: Unverified feature of the scene, in words for the message; None if the scheme is verified for it.
     """
     if solder.numerics.scheme != "ispg" or place is None:
         return []
@@ -64,7 +71,15 @@ def ispg_problems(solder: Solder, place: str | None) -> list[Problem]:
 
 
 def effect_problems(solder: Solder, effects: Mapping[str, Decision]) -> list[Problem]:
-    """Find solder that never comes to rest because neither surface tension nor inertia acts."""
+    """Find solder that never comes to rest because neither surface tension nor inertia acts.
+
+    Args:
+        solder: Solder of the case.
+        effects: Name -> decision; ``surface_tension`` and ``inertia`` are used.
+
+    Returns:
+        No or one input error.
+    """
     tension = effects["surface_tension"]
     if tension["on"] or effects["inertia"]["on"]:
         return []
@@ -181,10 +196,10 @@ def mm_per_s(speed: float) -> str:
 
 
 def too_many(scene: str, spacing: float, count: int) -> list[Problem]:
-    """Find a scene with too many particles for the memory.
+    """Find a scene with too many particles for the memory; no or one input error.
 
     Args:
-        scene: Table of the scene in the case file.
+        scene: Table of the scene in the case file, the first part of the error's key.
         spacing: Spacing of the particles [m].
         count: Number of particles.
     """

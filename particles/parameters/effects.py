@@ -36,7 +36,15 @@ AT_REST = {
 
 
 def decide(numbers: Numbers, solder: Solder) -> dict[str, Decision]:
-    """Decide on each effect of a reflow: name -> decision with its reason."""
+    """Decide on each effect of a reflow.
+
+    Args:
+        numbers: Dimensionless numbers of the joint or drop.
+        solder: Fluid, process and the switches of the effects.
+
+    Returns:
+        Effect name -> state ``on``, reason ``why`` and, if predicted, ``influence``.
+    """
     return decide_all(LIQUID_EFFECTS, LiquidScene(numbers, solder))
 
 
@@ -46,7 +54,15 @@ def decide_effects(geometry: JointGeometry, solder: Solder) -> dict[str, Decisio
 
 
 def decide_drop(solder: Solder, is_free: bool) -> dict[str, Decision]:
-    """Decide on each effect of a drop: name -> decision; wall effects are off for a free drop."""
+    """Decide on each effect of a drop.
+
+    Args:
+        solder: Fluid, process and the switches of the effects.
+        is_free: Whether the drop is free of walls; wall effects are then off.
+
+    Returns:
+        Effect name -> state ``on``, reason ``why`` and, if predicted, ``influence``.
+    """
     return decide_all(LIQUID_EFFECTS, LiquidScene(drop_numbers(solder), solder, has_wall=not is_free))
 
 
@@ -56,7 +72,7 @@ def decide_oscillation(solder: Solder) -> dict[str, Decision]:
 
 
 def switched(effects: Mapping[str, Decision]) -> dict[str, bool]:
-    """Return which effects are on: name -> bool."""
+    """Return which effects are on, name -> bool, from the decisions on them."""
     return {name: decision["on"] for name, decision in effects.items()}
 
 

@@ -39,7 +39,7 @@ def joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
 
 
 def unverified_joint(joint: Joint, solder: Solder) -> str | None:
-    """Return the feature of a joint for which the scheme ispg is not verified; None if it is verified."""
+    """Return the feature of a joint for which the scheme ispg is not verified, in words; None if it is verified."""
     if joint.package is not None and solder.wall != "free-slip":
         return "packages that float, on walls with friction"
     return _without_inertia(joint.geometry, solder)

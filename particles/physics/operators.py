@@ -121,6 +121,10 @@ def wall_areas(body: Body, space: Discretisation) -> Floats:
 
     The volume gradient of a particle is one third of the area vectors of all faces around it. At contact lines this
     includes faces of the free surface, which are subtracted.
+
+    Args:
+        body: Liquid body.
+        space: Discretisation of the body, with the volume gradients of its particles.
     """
     corners = body.points[body.triangles]
     vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 6.0

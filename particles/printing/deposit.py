@@ -292,7 +292,12 @@ class Deposit:
 
 
 def add_to_ground(ground: LevelSet, body: CuredBody) -> None:
-    """Add a solid body and its mirror image behind the plate to the level set of the ground, in place."""
+    """Add a solid body and its mirror image behind the plate to the level set of the ground.
+
+    Args:
+        ground: Distance to the solid bodies, negative in them; changed in place near the body.
+        body: Solid body, which ends on the plate z = 0.
+    """
     points, triangles = with_mirror_image(body.points, body.triangles)
     part, nodes = ground.grid.part_around(points, MARGIN)
     distance = signed_distance_in_band(points, triangles, part, MARGIN * part.spacing)

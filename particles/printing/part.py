@@ -83,7 +83,15 @@ class Part:
 
 
 def part_of(scene: Printing, deposit: Deposit) -> Part:
-    """Assemble the printed part from the solid bodies of a deposit."""
+    """Assemble the printed part from the solid bodies of a deposit.
+
+    Args:
+        scene: Printing parameters.
+        deposit: State of the print after its last drop.
+
+    Returns:
+        Surface, height map, layers and voids; gaps narrower than the resolution are closed.
+    """
     level = close_gaps(deposit.ground, GAP * deposit.law.spacing)
     x, y, z = level.grid.axes()
     above = LevelSet(level.grid, np.maximum(level.values, -z))
@@ -150,7 +158,17 @@ def _count_groups(points: Floats, reach: float) -> int:
 
 
 def measure_part(scene: Printing, deposit: Deposit, part: Part) -> Metrics:
-    """Return the metrics of a printed part, each with value and unit."""
+    """Return the metrics of a printed part: name -> (value, unit).
+
+    Args:
+        scene: Printing parameters.
+        deposit: State of the print after its last drop, with its particles.
+        part: Printed part that ``part_of`` returned.
+
+    Returns:
+        Number of drops, errors of the volume, largest number of separate bodies, roughness, heights, footprint and
+        voids.
+    """
     printed = scene.drops * scene.drop_volume
     bodies = sum(layer.volume for layer in part.layers)
     field = _printed_heights(scene, (part.x, part.y), part.heights)

@@ -66,9 +66,12 @@ def wildeman(weber: float, reynolds: float, angle: float) -> float:
 
 
 def of_measured(weber: float, reynolds: float, angle: float) -> tuple[float, float] | None:
-    """Return the smallest and the largest spread by the correlations of measured drops; None outside their validity.
+    """Return the smallest and the largest spread over the diameter by the correlations of measured drops.
 
     Args: as ``pasandideh_fard``.
+
+    Returns:
+        Smallest and largest spread; None where the correlations are not valid.
     """
     if weber < LEAST_WEBER or not LEAST_REYNOLDS <= reynolds <= MOST_REYNOLDS * weber**2.5:
         return None

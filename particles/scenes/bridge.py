@@ -68,7 +68,10 @@ def solve_bridge(
 def placed_joints(
     geometries: Sequence[JointGeometry], shapes: Sequence[JointShape], distance: float, solder: Solder
 ) -> list[Body]:
-    """Return two joints at rest between plates with the pads of both; arguments as for ``solve_bridge``."""
+    """Return two joints at rest as bodies between two plates with the pads of both.
+
+    The bodies lie half the distance on either side of x = 0 and are not merged; arguments as for ``solve_bridge``.
+    """
     gap = float(np.mean([geometry.gap for geometry in geometries]))
     spacing = max(solder.numerics.spacing, gap / SPACINGS_IN_GAP)
     walls, centres = _walls(geometries, distance, gap, solder.pad_contact_angle), (-0.5 * distance, 0.5 * distance)
@@ -121,6 +124,9 @@ def contacts(places: Mapping[str, tuple[float, float]], widths: Mapping[str, flo
         places: Name of a joint -> x and y of its axis [m].
         widths: Name of a joint -> largest width of the joint at rest alone [m].
         mirrored: Whether x = 0 and y = 0 are planes of symmetry, whose mirror images of the joints count, too.
+
+    Returns:
+        Names of both joints, distance of their axes [m] and overlap [m] of each pair.
     """
     names = list(places)
     points = np.array([places[name] for name in names])

@@ -85,7 +85,10 @@ def flow_to_rest(
     progress: Callable[[float], None] | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> tuple[LiquidFlow, Run]:
-    """Return the flow of a drop at rest and its run; arguments and errors as ``drop_to_rest``."""
+    """Return the flow of a drop at rest and the records of its steps.
+
+    Arguments and errors as for ``drop_to_rest``; the drop may be a section, or a part cut by planes of symmetry.
+    """
     acting = switched(decide_drop(solder, drop.is_free))
     if drop.section != "none":
         section = start_section(drop, solder, acting)

@@ -91,7 +91,7 @@ def joint_to_rest(
 
 
 def floating(package: FloatingPackage) -> Floating:
-    """Return the motion of a floating package."""
+    """Return the motion of a floating package: the plate 1 under its load [N], free in the directions of the case."""
     free = np.vstack([DIRECTIONS[name] for name in package.free])
     return Floating(1, free, np.array([0.0, 0.0, -package.load]))
 

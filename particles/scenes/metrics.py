@@ -40,7 +40,10 @@ JOINT_NAMES = {
 
 
 def joint_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
-    """Return the metrics of a joint at the end of its run, with errors against the reference of its geometry."""
+    """Return the metrics of a joint at the end of its run: name -> (SI value, unit; angles in deg).
+
+    Errors refer to the Young-Laplace joint of the given final geometry; they are nan if it does not exist.
+    """
     reference = reference_meridian(geometry, solder, _reference_weight(flow))
     errors = _joint_errors(solder, flow, run, reference) | _width_error(geometry, solder, flow, run)
     shape = _joint_shape(geometry, solder, flow, run) | errors
@@ -61,7 +64,10 @@ def drop_metrics(solder: Solder, pad_radius: float, flow: LiquidFlow, run: Run) 
 
 
 def body_metrics(solder: Solder, reference: Meridian | None, flow: LiquidFlow, run: Run) -> Metrics:
-    """Return the metrics of a drop, with errors against a reference and contact angles if it has them."""
+    """Return the metrics of a drop: name -> (SI value, unit; angles in deg).
+
+    Errors are omitted if ``reference`` is None, contact radius and angles without contact lines.
+    """
     profile = run.profiles[-1]
     height, width = profile.drop_height(len(flow.body.cloud.rings)), profile.max_width
     shape: Metrics = {"height": (height, "m"), "max_width": (width, "m")}
@@ -110,7 +116,8 @@ def _contact(solder: Solder, flow: LiquidFlow, reference: Meridian | None) -> Me
 def drop_errors(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
     """Return the errors in height and shape of a drop on one pad against the exact drop of its volume.
 
-    The result is empty for a pendant drop with weight, which has no reference.
+    ``drop_height_error`` is relative to the height, ``drop_shape_error`` to the cube root of the volume. The result is
+    empty for a pendant drop with weight, which has no reference.
     """
     body, plate, pad = flow.body, flow.body.plates[0], flow.physics.lines[0].pads[0]
     volume, weight = body.volume()[0], _reference_weight(flow)
@@ -126,14 +133,14 @@ def drop_errors(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
 
 
 def open_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
-    """Return the metrics of an open joint with a drop on the board, under the names of a joint."""
+    """Return the metrics of an open joint with a drop on the board, under the names of a joint; axial force 0."""
     drop = drop_metrics(solder, geometry.radius_board, flow, run)
     renamed = {JOINT_NAMES.get(name, name): number for name, number in drop.items()}
     return renamed | {"standoff": (geometry.gap, "m"), "axial_force": (0.0, "N")}
 
 
 def bridge_metrics(gap: float, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
-    """Return the metrics of joints that merged into one body between plates at a distance ``gap`` [m].
+    """Return the metrics of joints that merged into one body between plates at a distance ``gap`` [m], without errors.
 
     ``solder`` has the total volume of the joints.
     """
@@ -172,12 +179,15 @@ def contact_radius(body: Body, wall: int) -> float:
 
 
 def mean_angle(cosines: Floats) -> float:
-    """Return the contact angle of the mean of cosines [deg]."""
+    """Return the contact angle of the mean of cosines, shape (k,), one for each vertex of a contact line [deg]."""
     return float(np.degrees(np.arccos(np.clip(cosines.mean(), -1.0, 1.0))))
 
 
 def verdict(lines: Sequence[ContactLine], ruptured: bool) -> str:
-    """Return the verdict on a joint or drop: "open", "bridged", "overflow", "dewetted" or "ok"."""
+    """Return the verdict on a joint or drop, the first that applies.
+
+    "open" (neck ruptured), "bridged" (line on several pads), "overflow" (on the mask), "dewetted" (off the edge), "ok".
+    """
     if ruptured:
         return "open"
     if any(len(line.wetted_pads()) > 1 for line in lines):
@@ -304,8 +314,8 @@ def particles_lost(body: Body) -> int:
 def energy_metrics(flows: Sequence[LiquidFlow]) -> Metrics:
     """Return the metrics of the energy budget: losses by cause over the initial energy, and the imbalance.
 
-    The result is empty for schemes without a budget, that is all but ispg. It includes the sliding speed, since a body
-    may slide on smooth walls for ever.
+    Losses of all bodies are added. The result is empty for schemes without a budget, that is all but ispg. It includes
+    the sliding speed, since a body may slide on smooth walls for ever.
     """
     moved = [(flow, flow.solver.state, flow.solver.first_energy) for flow in flows if isinstance(flow.solver, IspgStep)]
     started = [(flow, state, first) for flow, state, first in moved if state is not None]

@@ -50,7 +50,11 @@ class Orientation:
 
 
 def canonical(geometry: JointGeometry) -> tuple[JointGeometry, Orientation]:
-    """Return a joint in canonical orientation, and the transformation from it to the joint."""
+    """Return a joint in canonical orientation, and the transformation from it to the joint.
+
+    The package is then tilted about the y axis only, or offset along +x without tilt; rotated and mirrored joints share
+    one canonical joint, so that it is computed once.
+    """
     x, y = _without_rounding(geometry.offset, 1.0)
     turn_x, turn_y = _without_rounding(geometry.tilt, geometry.radius_package)
     steepness, distance = hypot(turn_x, turn_y), hypot(x, y)
@@ -71,13 +75,17 @@ def _without_rounding(pair: tuple[float, float], lever: float) -> tuple[float, f
 
 
 def sizes(geometry: JointGeometry) -> Floats:
-    """Return the lengths that identify a joint in canonical orientation, shape (6,) [m]."""
+    """Return the lengths that identify a joint in canonical orientation, shape (6,) [m].
+
+    They are the gap, the radii on board and package, the offset along x and y, and the rise of the pad's edge by the
+    tilt.
+    """
     discs = (geometry.gap, geometry.radius_board, geometry.radius_package)
     return np.array([*discs, *geometry.offset, geometry.tilt[1] * geometry.radius_package])
 
 
 def orient(shape: JointShape, orientation: Orientation) -> JointShape:
-    """Transform the shape of a canonical joint to an orientation."""
+    """Return the shape of a canonical joint, rotated and mirrored to an orientation; metrics and history are kept."""
     if orientation == Orientation():
         return shape
 

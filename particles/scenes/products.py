@@ -22,11 +22,11 @@ TIMES = (
 
 
 def write_shapes(path: Path | str, shapes: Mapping[str, JointShape]) -> None:
-    """Write shapes, one group each, with history, snapshots and metrics.
+    """Write shapes, one group each, with history, snapshots and metrics without timings.
 
     Args:
         path: HDF5 file; replaced if it exists.
-        shapes: Name -> shape.
+        shapes: Name -> shape, whose arrays are written in SI units.
     """
     with h5py.File(path, "w") as file:
         for name, shape in shapes.items():
@@ -53,12 +53,18 @@ def _write_shape(group: h5py.Group, shape: JointShape) -> None:
 
 
 def remove_timings(metrics: Mapping[str, tuple]) -> dict[str, tuple]:
-    """Return the metrics without timings, which are equal on all machines."""
+    """Return the metrics, name -> (value, unit), without timings; these metrics are equal on all machines."""
     return {name: metric for name, metric in metrics.items() if name not in TIMES}
 
 
 def write_body(folder: Path, shape: JointShape, reference: Meridian | None) -> None:
-    """Write one drop or joint: ``shape.h5``, with its exact meridian if it has one, and ``particles.vtu``."""
+    """Write one drop or joint: ``shape.h5``, with its exact meridian if it has one, and ``particles.vtu``.
+
+    Args:
+        folder: Existing folder; both files are replaced.
+        shape: Shape at rest.
+        reference: Exact meridian; None if the shape has none.
+    """
     write_shapes(folder / "shape.h5", {BODY: shape})
     if reference is not None:
         with h5py.File(folder / "shape.h5", "a") as file:
@@ -67,7 +73,11 @@ def write_body(folder: Path, shape: JointShape, reference: Meridian | None) -> N
 
 
 def read_body(folder: Path) -> tuple[JointShape, np.ndarray | None]:
-    """Read the files of ``write_body``: the shape, and radius and height of the exact meridian, shape (2, k) [m]."""
+    """Read the file ``shape.h5`` of ``write_body``.
+
+    Returns:
+        Shape, and radii and heights of the exact meridian, shape (2, k) [m]; None if none was written.
+    """
     with h5py.File(folder / "shape.h5", "r") as file:
         return _read_shape(file[BODY]), file[REFERENCE][()] if REFERENCE in file else None
 
@@ -102,7 +112,11 @@ def _read_shape(group: h5py.Group) -> JointShape:
 def write_particles(path: Path | str, shape: JointShape) -> None:
     """Write the particles at rest and the triangles of the free surface as VTU.
 
-    Point data are velocity, pressure, and ``surface``, which is 1 on the free surface and 0 inside.
+    Point data are velocity [m/s], pressure [Pa], and ``surface``, which is 1 on the free surface and 0 inside.
+
+    Args:
+        path: The ``.vtu`` file to write.
+        shape: Shape at rest; coordinates are written in metres.
     """
     count = len(shape.points)
     cells = [("vertex", np.arange(count).reshape(-1, 1)), ("triangle", shape.triangles)]
@@ -112,7 +126,12 @@ def write_particles(path: Path | str, shape: JointShape) -> None:
 
 
 def write_flow(folder: Path, result: FlowResult) -> None:
-    """Write the pictures, history and metrics of a flow to ``flow.h5``, and its end to ``particles.vtu``."""
+    """Write a flow: pictures, history and metrics without timings to ``flow.h5``, its end to ``particles.vtu``.
+
+    Args:
+        folder: Existing folder; both files are replaced.
+        result: Result of the flow.
+    """
     with h5py.File(folder / FLOW, "w") as file:
         file["walls"] = result.walls
         for name, column in result.history.items():

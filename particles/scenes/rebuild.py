@@ -113,9 +113,13 @@ def _put_centre(body: Body, walls: Sequence[Plate], centre: Floats) -> None:
 
 
 def hand_over(old: Sequence[LiquidFlow], new: Sequence[LiquidFlow]) -> None:
-    """Transfer time and steps from old flows to those of remeshed bodies.
+    """Transfer time and steps from old flows to those of remeshed bodies, the latest of each.
 
     With the scheme ispg, motion, centre and energy budget are transferred, too.
+
+    Args:
+        old: Flows of the bodies before remeshing; not changed.
+        new: Flows of the bodies that replace them, changed in place before their first step.
     """
     for flow in new:
         flow.time, flow.steps = max(former.time for former in old), max(former.steps for former in old)

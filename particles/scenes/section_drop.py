@@ -17,7 +17,13 @@ from reflowshock.particles.steps.time_step import TimeStep, largest_step
 
 
 def start_section(drop: Drop, solder: Solder, effects: dict[str, bool]) -> SectionFlow:
-    """Set up the flow of a drop's section from rest, with only the effects that are on."""
+    """Set up the flow of a drop's section from rest, with only the effects that are on.
+
+    Args:
+        drop: Drop with the kind of its section, plane or axisymmetric, and its resolution.
+        solder: Fluid and numerics.
+        effects: Name -> on or off; missing effects are off.
+    """
     if drop.section == "plane":
         polyline, width = Polyline.plane(is_closed=False, depth=drop.edge), 0.5 * drop.edge
     else:

@@ -59,12 +59,23 @@ STEP_METHODS = (
 
 
 def step_method(solder: Solder, effects: Mapping[str, bool]) -> StepMethod:
-    """Return the particle method for the scheme of a solder and its active effects."""
+    """Return the first particle method for the scheme of a solder that applies with its active effects.
+
+    Args:
+        solder: Solder with the selected scheme.
+        effects: Name -> on or off; missing effects are off.
+    """
     return next(m for m in STEP_METHODS if m.scheme == solder.numerics.scheme and m.applies(effects))
 
 
 def start_solver(solder: Solder, effects: Mapping[str, bool], physics: Physics) -> tuple[StepSolver, Physics]:
-    """Return a new step solver, and the physics with the events that its method adds."""
+    """Return a new step solver, and the physics with the events that its method adds.
+
+    Args:
+        solder: Fluid and numerics, with the selected scheme.
+        effects: Name -> on or off; missing effects are off.
+        physics: Physics of the active effects; not changed.
+    """
     method = step_method(solder, effects)
     solver = method.build(solder)
     events = method.events(solver, physics)

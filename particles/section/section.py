@@ -154,7 +154,14 @@ class Placements:
 
 
 def rotate_copies(angles: Floats) -> Placements:
-    """Return copies rotated about the z axis by angles of shape (m,) [rad]."""
+    """Return the placements of copies of a section rotated about the z axis.
+
+    Args:
+        angles: Angle of each copy, shape (m,) [rad].
+
+    Returns:
+        Rotation and translation of each copy; the translations are zero.
+    """
     cosine, sine, none = np.cos(angles), np.sin(angles), np.zeros_like(angles)
     rows = [[cosine, -sine, none], [sine, cosine, none], [none, none, none + 1.0]]
     return Placements(np.moveaxis(np.array(rows), 2, 0), np.zeros((len(angles), 3)))

@@ -37,7 +37,13 @@ class Speeds(NamedTuple):
 
 @njit
 def fields_of(state, walls):
-    """Return the rows of ``state`` and ``walls`` as ``Fields``."""
+    """Return the rows of two device arrays as ``Fields``, without copying, within a CUDA kernel.
+
+    Args:
+        state: Values of all particles, shape (13, n): x, y, z, u, v, w, density, pressure, mass, density gradient (3)
+            and viscosity.
+        walls: Values of the wall particles, shape (5, m): velocity (3), room and share.
+    """
     return Fields(
         state[0], state[1], state[2], state[3], state[4], state[5], state[6], state[7], state[8], state[9], state[10],
         state[11], walls[0], walls[1], walls[2], walls[3], walls[4], state[12],
@@ -60,7 +66,14 @@ class Loops(NamedTuple):
 
 @lru_cache
 def loops_of(law: Law) -> Loops:
-    """Compile the kernels of a law; its numbers are constants in them, so terms that do not act vanish."""
+    """Compile the kernels of a law; its numbers are constants in them, so terms that do not act vanish.
+
+    Args:
+        law: Parameters of the pair interactions.
+
+    Returns:
+        Kernels for ``launch``; the arguments of each are listed in ``Loops``.
+    """
     return Loops(*_motion_kernels(law), *_pair_sum_kernels(law))
 
 

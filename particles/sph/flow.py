@@ -84,11 +84,14 @@ def run_flow(
     """Run a simulation to a final time with about ``SAMPLES`` rows of history and ``PICTURES`` pictures.
 
     Args:
-        simulation: Simulation in its initial state.
+        simulation: Simulation in its initial state; advanced in place.
         until: Final time [s].
-        sample: Returns a row of the history, the time first.
-        progress: Called with the completed fraction.
+        sample: Function of the simulation that returns a row of the history, the time [s] first.
+        progress: Function called with the completed fraction, 0 to 1.
         checkpoint: Checkpoint to continue from, with identical bits, and to write.
+
+    Returns:
+        Simulation at the final time, rows of the history, pictures and wall time.
 
     Raises:
         FloatingPointError: A position is not finite.
@@ -130,6 +133,8 @@ def _flow_until(
 
 def device_of(scene: FlowScene) -> Callable[[Fields, int, Law], Particles]:
     """Return the class of particles for the device of a flow; CUDA is imported only if it is requested.
+
+    The class takes the initial fields, the number of liquid particles and the law.
 
     Raises:
         NoDeviceError: The machine has no CUDA device.
@@ -181,7 +186,11 @@ def law_of(scene: FlowScene, periods: Vector, gravity: Vector, has_surface: bool
 
 
 def shear_law(scene: FlowScene) -> dict[str, Any]:
-    """Return the entries of ``Law`` for a shear-dependent viscosity."""
+    """Return the entries of ``Law`` for a shear-dependent viscosity, neutral ones without it.
+
+    Returns:
+        ``rheology``, ``exponent``, ``shear_rate`` [1/s], ``least_viscosity`` and ``most_viscosity`` [Pa s].
+    """
     rheology = scene.rheology
     if rheology is None or not decide_flow(scene)["shear_dependent_viscosity"]["on"]:
         return {"rheology": NEWTON, "exponent": 1.0, "shear_rate": 1.0, "least_viscosity": 0.0, "most_viscosity": 0.0}
@@ -239,7 +248,13 @@ def make_fields(liquid: Floats, walls: Floats, pressure: Floats, law: Law) -> Fi
 
 
 def result_of(run: FlowRun, history: dict[str, Floats], metrics: Metrics) -> FlowResult:
-    """Return the result of a run, with the metrics that all flows share added to its own."""
+    """Return the result of a run, with the metrics that all flows share added to its own.
+
+    Args:
+        run: Finished run.
+        history: Column name -> samples over time, shape (n,).
+        metrics: Metric name -> (value, unit) of this kind of flow; volume drift, counts and timings are added.
+    """
     simulation = run.simulation
     fluids, fields = simulation.fluids, simulation.fields
     at_start = fluids * simulation.law.spacing**simulation.law.dimension

@@ -28,13 +28,13 @@ FROZEN = 0.5
 
 @summed
 def temperature_laplacian(i, neighbours, fields, temperatures, law):
-    """Return the Laplacian of the temperature over the density at a particle [K m/kg].
+    """Return the Laplacian of the temperature over the density at a particle, a scalar [K m/kg].
 
     Args:
         i: Particle.
-        neighbours: Neighbours of the particle, which include itself because of its image.
+        neighbours: Neighbours of the particle, shape (k,), which include itself because of its image.
         fields: ``Fields`` of all particles.
-        temperatures: Temperatures of all particles and of their images, shape (2, n) [K].
+        temperatures: Temperatures of all particles, row 0, and of their mirror images, row 1, shape (2, n) [K].
         law: ``Law`` of the particles.
     """
     x, y, z, temperature = fields.x[i], fields.y[i], fields.z[i], temperatures[0, i]

@@ -19,7 +19,14 @@ PAIRING = 0.2
 
 @njit(cache=True, error_model="numpy")
 def continuity(approach, slope, volume, density):
-    """Return the continuity term rho_i (u_i - u_j) . grad W V_j; ``approach`` = (u_i - u_j) . d."""
+    """Return the continuity term rho_i (u_i - u_j) . grad W V_j, a scalar [kg/(m^3 s)].
+
+    Args:
+        approach: (u_i - u_j) . d with the vector d from j to i [m^2/s].
+        slope: Kernel gradient over d, in 1/m^(dimension + 2).
+        volume: Volume V_j of the neighbour.
+        density: Density of particle i [kg/m^3].
+    """
     return density * approach * slope * volume
 
 
@@ -35,13 +42,31 @@ def density_diffusion(jump, rise, slope, volume):
 
 @njit(cache=True, error_model="numpy")
 def pressure(pressure_i, pressure_j, slope, volume, lightness):
-    """Return the pressure gradient term -(p_i + p_j) grad W V_j / rho_i."""
+    """Return the pressure gradient term -(p_i + p_j) grad W V_j / rho_i as a factor of the vector d from j to i.
+
+    Args:
+        pressure_i: Pressure of the particle [Pa].
+        pressure_j: Pressure of the neighbour [Pa].
+        slope: Kernel gradient over d, in 1/m^(dimension + 2).
+        volume: Volume V_j of the neighbour.
+        lightness: 1 / rho_i [m^3/kg].
+    """
     return -(pressure_i + pressure_j) * slope * volume * lightness
 
 
 @njit(cache=True, error_model="numpy")
 def artificial_viscosity(approach, distance2, slope, volume, lightness):
-    """Return artificial viscosity over alpha h c0 rho_0, u.r / r^2 grad W V_j / rho_i (Antuono et al. 2012)."""
+    """Return artificial viscosity over alpha h c0 rho_0, u.r / r^2 grad W V_j / rho_i (Antuono et al. 2012).
+
+    Like ``pressure``, a factor of the vector d from j to i.
+
+    Args:
+        approach: (u_i - u_j) . d [m^2/s].
+        distance2: Squared distance of the particles [m^2].
+        slope: Kernel gradient over d, in 1/m^(dimension + 2).
+        volume: Volume V_j of the neighbour.
+        lightness: 1 / rho_i [m^3/kg].
+    """
     return approach / (distance2 + NOTHING) * slope * volume * lightness
 
 

@@ -33,16 +33,28 @@ def predict(i, fields, rates, middle, time_step):
 
 @compiled
 def settle(i, fields, middle, law):
-    """Reflect a particle that crossed the mirror and compute its pressure from its density."""
+    """Reflect a particle that crossed the mirror and compute its pressure from its density.
+
+    Args:
+        i: Particle.
+        fields: ``Fields`` of all particles; those of particle i change.
+        middle: Values in the middle of the step, shape (7, n), whose velocity along z is reflected, too.
+        law: ``Law`` of the particles.
+    """
     middle[2, i] *= reflect(i, fields, law)
     fields.pressure[i] = law.sound * law.sound * (fields.density[i] - law.rest_density)
 
 
 @compiled
 def reflect(i, fields, law):
-    """Replace a particle behind the mirror z = 0 by its image; return -1 if it was replaced, else 1.
+    """Replace a particle behind the mirror z = 0 by its image; return -1.0 if it was replaced, else 1.0.
 
     The code has no branch, since with a branch threads would count references to all fields for every particle.
+
+    Args:
+        i: Particle.
+        fields: ``Fields`` of all particles; position, velocity and density gradient along z may change sign.
+        law: ``Law`` of the particles; without a mirror nothing changes.
     """
     side = -1.0 if law.mirror and fields.z[i] < 0.0 else 1.0
     fields.z[i] *= side
@@ -53,7 +65,15 @@ def reflect(i, fields, law):
 
 @compiled
 def correct(i, fields, rates, middle, time_step):
-    """Complete the time step [s] of a particle with the rates at its end and store the density gradient."""
+    """Complete the time step of a particle with the rates at its end and store the density gradient.
+
+    Args:
+        i: Particle.
+        fields: ``Fields`` of all particles; velocity, density and density gradient of particle i change.
+        rates: Rates as ``rates_of`` returns them, shape (10, n).
+        middle: Velocity (3) and density in the middle of the step in the first four rows, shape (7, n).
+        time_step: Time step [s].
+    """
     half = 0.5 * time_step
     fields.u[i] = middle[0, i] + half * rates[1, i]
     fields.v[i] = middle[1, i] + half * rates[2, i]
@@ -64,13 +84,27 @@ def correct(i, fields, rates, middle, time_step):
 
 @compiled
 def take_slope(i, fields, rates):
-    """Store the density gradient of a particle for the next step."""
+    """Store the density gradient of a particle for the next step.
+
+    Args:
+        i: Particle.
+        fields: ``Fields`` of all particles; the density gradient of particle i changes.
+        rates: Rates as ``rates_of`` returns them, shape (10, n); rows 4 to 6 are used.
+    """
     fields.slope_x[i], fields.slope_y[i], fields.slope_z[i] = rates[4, i], rates[5, i], rates[6, i]
 
 
 @compiled
 def shift(i, fields, rates, factor, law):
-    """Shift a particle against the concentration gradient times a factor [m^2] (Sun et al. 2017)."""
+    """Shift a particle against the concentration gradient (Sun et al. 2017), and reflect it at the mirror.
+
+    Args:
+        i: Particle.
+        fields: ``Fields`` of all particles; the position of particle i changes.
+        rates: Rates as ``rates_of`` returns them, shape (10, n); rows 7 to 9 are used.
+        factor: Factor of the gradient, a scalar [m^2].
+        law: ``Law`` of the particles.
+    """
     fields.x[i] -= factor * rates[7, i]
     fields.y[i] -= factor * rates[8, i]
     fields.z[i] -= factor * rates[9, i]
@@ -85,7 +119,15 @@ def speed2_of(i, fields):
 
 @compiled
 def cover(k, i, fields, found, law):
-    """Write the ``values`` that ``wall_values`` returns to the k-th wall particle, particle i of all."""
+    """Write the values of a wall particle to the fields; its density follows from its pressure.
+
+    Args:
+        k: Number among the wall particles.
+        i: Number among all particles.
+        fields: ``Fields`` of all particles; changed in place.
+        found: Pressure [Pa], velocity (3) [m/s] and weight, as ``wall_values`` returns them.
+        law: ``Law`` of the particles.
+    """
     pressure, u, v, w, share = found
     fields.pressure[i], fields.u[i], fields.v[i], fields.w[i], fields.wall_share[k] = pressure, u, v, w, share
     fields.density[i] = law.rest_density + pressure / (law.sound * law.sound)

@@ -25,7 +25,7 @@ summed = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", 
 
 @compiled
 def periods_of(law):
-    """Return the period [m] and its inverse for each direction; zeros if not periodic."""
+    """Return (period [m], 1 / period) of a ``Law`` for each of x, y and z; zeros if not periodic."""
     x, y, z = law.period_x, law.period_y, law.period_z
     return (x, 1.0 / x if x > 0.0 else 0.0), (y, 1.0 / y if y > 0.0 else 0.0), (z, 1.0 / z if z > 0.0 else 0.0)
 
@@ -44,13 +44,24 @@ def constants_of(law):
 
 @compiled
 def across(distance, period):
-    """Return a component of the vector between two particles [m] for the nearest periodic image."""
+    """Return a component of the vector between two particles [m] for the nearest periodic image.
+
+    ``distance`` is the difference of their coordinates [m], ``period`` the period [m] and its inverse, or zeros.
+    """
     return distance - period[0] * floor(distance * period[1] + 0.5)
 
 
 @compiled
 def apart(place, j, side, fields, periods):
-    """Return the vector from particle j, or from its mirror image if ``side`` is -1, to a position [m]."""
+    """Return the vector (x, y, z) from a particle, or from its mirror image, to a position [m].
+
+    Args:
+        place: Position (x, y, z) [m].
+        j: Particle.
+        side: 1 for the particle, -1 for its image behind the plane z = 0.
+        fields: ``Fields`` of all particles.
+        periods: Periods that ``periods_of`` returns.
+    """
     dx = across(place[0] - fields.x[j], periods[0])
     dy = across(place[1] - fields.y[j], periods[1])
     return dx, dy, across(place[2] - side * fields.z[j], periods[2])
@@ -64,7 +75,10 @@ def positive(value):
 
 @compiled
 def liquid_among(neighbours, fluids):
-    """Return the number of liquid particles in a row, in which they come first, by bisection."""
+    """Return the number of liquid particles in a row, in which they come first, by bisection.
+
+    Particles with numbers below ``fluids`` are liquid.
+    """
     first, last = 0, len(neighbours)
     while first < last:
         middle = (first + last) // 2
@@ -77,7 +91,14 @@ def liquid_among(neighbours, fluids):
 
 @compiled
 def closing_in(k, velocity, d, fields):
-    """Return (u_i - u_j) . d for the k-th wall particle, doubled for weighted ones, which act as mirror images."""
+    """Return (u_i - u_j) . d for a wall particle, doubled for weighted ones, which act as mirror images [m^2/s].
+
+    Args:
+        k: Number among the wall particles.
+        velocity: Velocity u_i (x, y, z) [m/s].
+        d: Vector (x, y, z) from the wall particle to i [m].
+        fields: ``Fields`` of all particles.
+    """
     u, v, w = velocity[0] - fields.wall_u[k], velocity[1] - fields.wall_v[k], velocity[2] - fields.wall_w[k]
     closing = u * d[0] + v * d[1] + w * d[2]
     return 2.0 * closing if fields.wall_room[k] > 0.0 else closing
@@ -217,7 +238,10 @@ def _by_walls(i, fluids, neighbours, fields, law):
 
 @summed
 def drift_of(i, fluids, neighbours, fields, law):
-    """Return the velocity (3) [m/s] that XSPH adds when it moves a liquid particle; momentum does not change."""
+    """Return the velocity (x, y, z) [m/s] that XSPH adds when it moves a liquid particle; momentum does not change.
+
+    Arguments as in ``rates_of``.
+    """
     x, y, z, u, v, w = fields.x[i], fields.y[i], fields.z[i], fields.u[i], fields.v[i], fields.w[i]
     periods = periods_of(law)
     inverse = 1.0 / law.length
@@ -237,7 +261,13 @@ def drift_of(i, fluids, neighbours, fields, law):
 
 @compiled
 def solved(moments, sums, dimension):
-    """Return the gradient ``moments^-1 sums``, in a plane with x and z only; zero if neighbours do not resolve it."""
+    """Return the gradient (x, y, z) ``moments^-1 sums``, in a plane with x and z only; zero if not resolved.
+
+    Args:
+        moments: Entries xx, yy, zz, xy, yz and xz of a symmetric matrix.
+        sums: Right-hand side (x, y, z).
+        dimension: Dimension of the flow, 1 to 3.
+    """
     xx, yy, zz, xy, yz, xz = moments
     bx, by, bz = sums
     if dimension == 1:
@@ -261,10 +291,10 @@ def solved(moments, sums, dimension):
 
 @summed
 def fitted_slope(i, neighbours, fields, law):
-    """Return the slope (3) of the linear least-squares fit to the densities of a particle's neighbours [kg/m^4].
+    """Return the slope (x, y, z) of the linear least-squares fit to the densities of a particle's neighbours [kg/m^4].
 
     With the weights W V it solves the 4 x 4 system of Belytschko et al. (1998), with the first row eliminated. It is
-    zero if neighbours do not resolve it (Shepard interpolation).
+    zero if neighbours do not resolve it (Shepard interpolation). Arguments as in ``rates_of``.
     """
     x, y, z, density = fields.x[i], fields.y[i], fields.z[i], fields.density[i]
     periods, inverse = periods_of(law), 1.0 / law.length
@@ -302,6 +332,7 @@ def condition_of(moments, dimension):
     """Return an upper bound of the condition number of a symmetric matrix; infinite if singular.
 
     The largest eigenvalue is at most the trace, and the middle one at most half of it. In a plane only x and z count.
+    ``moments`` are its entries xx, yy, zz, xy, yz, xz; ``dimension`` is that of the flow, 1 to 3.
     """
     xx, yy, zz, xy, yz, xz = moments
     if dimension == 1:
@@ -315,11 +346,12 @@ def condition_of(moments, dimension):
 
 @summed
 def wall_values(i, fluids, neighbours, fields, law):
-    """Return pressure, velocity (3) and weight of a wall particle from the liquid near it (Adami et al. 2012).
+    """Return pressure [Pa], velocity (3) [m/s] and weight of a wall particle from the liquid near it.
 
-    The pressure is extrapolated from the liquid with its hydrostatic part. With a free surface that is not tracked it
-    is not negative. The velocity is twice the wall's minus the mean of the liquid, which gives the wall's velocity at
-    its face. The weight is ``Fields.wall_share``.
+    The pressure is extrapolated from the liquid with its hydrostatic part (Adami et al. 2012). With a free surface that
+    is not tracked it is not negative. The velocity is twice the wall's minus the mean of the liquid, which gives the
+    wall's velocity at its face. The weight is ``Fields.wall_share``. Arguments as in ``rates_of``; ``i`` counts all
+    particles.
     """
     x, y, z = fields.x[i], fields.y[i], fields.z[i]
     line = law.dimension == 1

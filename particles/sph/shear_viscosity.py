@@ -23,7 +23,7 @@ LAWS = {"power_law": POWER_LAW, "carreau": CARREAU}
 
 @compiled
 def viscosity_at(rate, law):
-    """Return the viscosity [Pa s] at a shear rate [1/s]."""
+    """Return the viscosity [Pa s] at a shear rate [1/s], both scalars, by the viscosity law of a ``Law``."""
     ratio = rate / law.shear_rate
     if law.rheology == CARREAU:
         share = (1.0 + ratio * ratio) ** (0.5 * (law.exponent - 1.0))
@@ -41,6 +41,13 @@ def viscosity_of(i, fluids, neighbours, fields, law):
     """Return the viscosity [Pa s] of a liquid particle from the renormalised velocity gradient.
 
     Wall particles count, with their extrapolated velocities, at no-slip walls only.
+
+    Args:
+        i: Particle.
+        fluids: Number of liquid particles.
+        neighbours: Row of the particle, liquid neighbours first, shape (k,).
+        fields: ``Fields`` of all particles.
+        law: ``Law`` of the particles, with the viscosity law.
     """
     x, y, z, u, v, w = fields.x[i], fields.y[i], fields.z[i], fields.u[i], fields.v[i], fields.w[i]
     inverse = 1.0 / law.length

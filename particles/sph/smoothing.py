@@ -31,9 +31,14 @@ def norm(kernel: int, dimension: int, length: float) -> float:
 
 @njit(cache=True, error_model="numpy")
 def shape(kernel, line, q):
-    """Return W / sigma at q >= 0; ``line`` is True in one dimension.
+    """Return the kernel W / sigma, a scalar without unit.
 
     All branches are computed and one is selected, so that a loop can compute several pairs at a time.
+
+    Args:
+        kernel: ``CUBIC_SPLINE`` or ``WENDLAND_C2``.
+        line: Whether the flow has one dimension.
+        q: Distance over the smoothing length, >= 0; W vanishes from q = 2.
     """
     rest, half = 2.0 - q, 1.0 - 0.5 * q
     spline = 1.0 - 1.5 * q * q * half if q < 1.0 else 0.25 * rest * rest * rest
@@ -44,7 +49,13 @@ def shape(kernel, line, q):
 
 @njit(cache=True, error_model="numpy")
 def slope(kernel, line, q):
-    """Return (dW / dq) / (sigma q) at q >= 0; grad W is this times sigma / h^2 times the vector between the points."""
+    """Return (dW / dq) / (sigma q); grad W is this times sigma / h^2 times the vector between the points.
+
+    Args:
+        kernel: ``CUBIC_SPLINE`` or ``WENDLAND_C2``.
+        line: Whether the flow has one dimension.
+        q: Distance over the smoothing length h, >= 0; the slope vanishes from q = 2.
+    """
     rest, half = 2.0 - q, 1.0 - 0.5 * q
     spline = -3.0 + 2.25 * q if q < 1.0 else -0.75 * rest * rest / q
     wendland = half * half * (-3.0 if line else -5.0 * half)

@@ -165,7 +165,15 @@ def find_weights(points, lists, fields, law, weights):
 
 @njit(cache=True, parallel=True)
 def carry(lists, shares, velocity, time_step, points):
-    """Move vertices ``points`` (m, 3) [m] with the particles' ``velocity`` (3, n) [m/s] over a time step [s]."""
+    """Move vertices with the particles near them.
+
+    Args:
+        lists: Offsets, shape (m + 1,), and indices of the particles near each vertex, shape (pairs,).
+        shares: Weights along and across the wall, shape (2, pairs); they sum to at most one at each vertex.
+        velocity: Velocities of the particles, shape (3, n) [m/s].
+        time_step: Time step [s].
+        points: Vertices, shape (m, 3) [m]; moved in place.
+    """
     offsets, indices = lists
     for v in prange(points.shape[0]):
         for k in range(offsets[v], offsets[v + 1]):

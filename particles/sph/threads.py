@@ -30,7 +30,12 @@ threaded = njit(cache=True, parallel=True, error_model="numpy")
 
 @njit(cache=True)
 def liquid_first(row, fluids):
-    """Reorder a row of neighbours so that liquid particles come first."""
+    """Reorder a row of neighbours in place so that liquid particles come first.
+
+    Args:
+        row: Numbers of the neighbours, shape (k,).
+        fluids: Number of liquid particles; smaller numbers are liquid.
+    """
     front = 0
     for k in range(row.shape[0]):
         if row[k] < fluids:

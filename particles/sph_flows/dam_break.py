@@ -22,6 +22,14 @@ def solve_dam_break(
 ) -> FlowResult:
     """Compute a dam break.
 
+    Args:
+        scene: Dam break.
+        progress: Function called with the completed fraction, 0 to 1.
+        checkpoint: Checkpoint to continue from, if its file exists, and to write.
+
+    Returns:
+        Pictures, history and the metrics of ``dam_metrics``, with the number of ``particles_lost``.
+
     Raises:
         FloatingPointError: A position is not finite.
     """
@@ -62,7 +70,7 @@ def _pressure_at(scene: DamBreak, simulation: Simulation) -> float:
 
 
 def particles_lost(scene: DamBreak, simulation: Simulation) -> int:
-    """Return the number of particles beyond the middle of the first layer of a wall."""
+    """Return the number of liquid particles that have left the tank: beyond the middle of the first layer of a wall."""
     liquid, half = slice(simulation.fluids), 0.5 * scene.spacing
     x, z = simulation.fields.x[liquid], simulation.fields.z[liquid]
     return int(((x < -half) | (x > tank_columns(scene) * scene.spacing + half) | (z < -half)).sum())

@@ -37,7 +37,15 @@ ENCLOSURES = 3
 def solve_droplet(
     scene: Droplet, progress: Callable[[float], None] | None = None, checkpoint: Checkpoint | None = None
 ) -> FlowResult:
-    """Compute the motion of a droplet.
+    """Compute the motion of a droplet from its start.
+
+    Args:
+        scene: Droplet.
+        progress: Function called with the completed fraction, 0 to 1.
+        checkpoint: Checkpoint to continue from, if its file exists, and to write.
+
+    Returns:
+        Pictures, history and metrics, and for impacts texts on their outcome.
 
     Raises: as ``follow``.
     """
@@ -50,10 +58,16 @@ def follow(
     progress: Callable[[float], None] | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> FlowResult:
-    """Compute the motion of a droplet from the state of a simulation.
+    """Compute the motion of a droplet from the state of a simulation, which is advanced in place.
+
+    Args:
+        scene: Droplet.
+        simulation: Particles and surface, as ``droplet`` returns them.
+        progress: Function called with the completed fraction, 0 to 1.
+        checkpoint: Checkpoint to continue from, if its file exists, and to write.
 
     Raises:
-        FloatingPointError: a position is not finite.
+        FloatingPointError: A position is not finite.
         SurfaceLost: The liquid has left its surface, or the surface has vanished.
     """
     try:
@@ -83,7 +97,15 @@ def droplet(scene: Droplet) -> Simulation:
 
 
 def liquid_of(scene: Droplet, spacing: float) -> tuple[Law, float]:
-    """Return the law of a droplet for a particle spacing [m], and its surface tension [N/m]."""
+    """Return the law of a droplet in space and its surface tension.
+
+    Args:
+        scene: Droplet.
+        spacing: Particle spacing [m].
+
+    Returns:
+        Parameters of the pair interactions, and surface tension [N/m], 0 if it does not act.
+    """
     effects = decide_flow(scene)
     weight = -scene.gravity if effects["droplet_gravity"]["on"] else 0.0
     law = flow.law_of(scene, (0.0, 0.0, 0.0), (0.0, 0.0, weight), has_surface=True)

@@ -20,6 +20,14 @@ def solve_poiseuille(
 ) -> FlowResult:
     """Compute the start of channel flow and its error against the exact speeds.
 
+    Args:
+        scene: Channel.
+        progress: Function called with the completed fraction, 0 to 1.
+        checkpoint: Checkpoint to continue from, if its file exists, and to write.
+
+    Returns:
+        Pictures, history and metrics; speeds and errors are over the speed of the scene.
+
     Raises:
         FloatingPointError: A position is not finite.
     """
@@ -55,7 +63,15 @@ def channel(scene: Poiseuille) -> Simulation:
 def solve_taylor_green(
     scene: TaylorGreen, progress: Progress | None = None, checkpoint: Checkpoint | None = None
 ) -> FlowResult:
-    """Compute decaying vortices and their error against the exact speeds.
+    """Compute decaying vortices in a periodic box and their error against the exact speeds.
+
+    Args:
+        scene: Vortices.
+        progress: Function called with the completed fraction, 0 to 1.
+        checkpoint: Checkpoint to continue from, if its file exists, and to write.
+
+    Returns:
+        Pictures, history and metrics of the flow.
 
     Raises:
         FloatingPointError: A position is not finite.

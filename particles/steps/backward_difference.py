@@ -140,9 +140,9 @@ def prepare_physics(physics: Physics, velocity: Floats, carried: dict[int, Float
     """Return the effects as the equivalent backward Euler step from predicted positions uses them.
 
     Args:
-        physics: Effects that act on the body.
+        physics: Effects that act on the body; not changed.
         velocity: Predicted velocity, shape (n, 3) [m/s].
-        carried: Displacement carried on from the last step by each moving plate, shape (6,) [m, rad].
+        carried: Number of a moving plate -> displacement carried on from the last step, shape (6,) [m, rad].
         time_step: Whole time step [s].
     """
     tensions = (part for part in physics.operators if isinstance(part, SurfaceTension))

@@ -60,12 +60,17 @@ class PinningState:
 
 
 def pinning_of(lines: Sequence[ContactLine]) -> list[PinningState]:
-    """Copy the current pinning of contact lines."""
+    """Copy the current pinning of contact lines, for ``restore_pinning``; one copy for each line, in their order."""
     return [PinningState.of(line) for line in lines]
 
 
 def restore_pinning(saved: Sequence[PinningState], lines: Sequence[ContactLine]) -> None:
-    """Give contact lines the pinning that ``pinning_of`` returned."""
+    """Give contact lines the pinning that ``pinning_of`` returned.
+
+    Args:
+        saved: Pinning of each line.
+        lines: The same contact lines in the same order; changed in place.
+    """
     for pinning, line in zip(saved, lines, strict=True):
         pinning.restore(line)
 
@@ -130,7 +135,13 @@ def highest_energy(body: Body, physics: Physics, solver: StepSolver, time_step: 
 
 
 def is_driven(body: Body, physics: Physics, time_step: float) -> bool:
-    """Return whether a plate moves along a prescribed path in a step [s]."""
+    """Return whether a plate moves noticeably along a prescribed path in a step.
+
+    Args:
+        body: Liquid body, with its present plates.
+        physics: Effects that act on the body, with the motions of plates.
+        time_step: Time step [s].
+    """
     for motion in physics.motions:
         plate, line = body.plates[motion.wall], body.points[body.cloud.rings[motion.wall]]
         displacement = time_step * plate.rigid_velocity(motion.prescribed_twist(plate, time_step), line)
@@ -230,7 +241,13 @@ def _offset(body: Body, physics: Physics, passes: float) -> Floats:
 
 
 def correct_volume(body: Body, physics: Physics, volume: float) -> None:
-    """Move a body along the gradient of its volume to a given volume [m^3], by Newton steps."""
+    """Move a body along the gradient of its volume to a given volume, by Newton steps.
+
+    Args:
+        body: Liquid body; its points are changed in place.
+        physics: Effects, whose walls and edges limit the motion.
+        volume: Enclosed volume to reach [m^3].
+    """
     for _ in range(VOLUME_PASSES):
         enclosed, gradient = body.volume()
         if abs(volume - enclosed) <= SAME_VOLUME * volume:

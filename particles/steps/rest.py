@@ -186,7 +186,11 @@ def _start(flow: LiquidFlow, on_snapshot: Callable[[Snapshot], None] | None, che
 
 
 def saved_run(flow: LiquidFlow, run: Run) -> dict[str, Any]:
-    """Return the data that a checkpoint keeps of a flow and its run; its dataclasses are ``RECORDS``."""
+    """Return the data that a checkpoint keeps of a flow and its run; its dataclasses are ``RECORDS``.
+
+    Returns:
+        State of the flow under ``flow`` and of the run under ``run``.
+    """
     return {"flow": flow.saved(), "run": run.saved()}
 
 
@@ -287,7 +291,12 @@ def is_lasting(records: Sequence[StepRecord], calm: int, rule: StopRule) -> bool
 
 
 def fraction_done(records: Sequence[StepRecord], rule: StopRule) -> float:
-    """Return the estimated fraction of the run that is done, in [0, 1], from the exponential decay of the motion."""
+    """Return the estimated fraction of the run that is done, in [0, 1], from the exponential decay of the motion.
+
+    Args:
+        records: Records of all steps so far; 0 without any.
+        rule: Criteria by which the run ends.
+    """
     if not records:
         return 0.0
     first, last = _motion(records[0], rule), _motion(records[-1], rule)

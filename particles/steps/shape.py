@@ -10,10 +10,10 @@ from reflowshock.arrays import Floats, Indices
 
 
 def concatenate_shapes(arrays: Sequence[NDArray], counts: Sequence[int]) -> NDArray:
-    """Concatenate particle arrays of several bodies, surface particles first.
+    """Concatenate particle arrays of several bodies, the surface particles of all bodies first.
 
     Args:
-        arrays: Array of each body, shape (n_i, ...).
+        arrays: Array of each body, shape (n_i, ...), its surface particles first.
         counts: Number of surface particles of each body.
     """
     pairs = list(zip(arrays, counts, strict=True))
@@ -24,8 +24,11 @@ def shifted_indices(indices: Sequence[Indices], counts: Sequence[int]) -> list[I
     """Shift indices into several arrays to indices into their concatenation.
 
     Args:
-        indices: Indices into each array.
+        indices: Indices into each array, of any shape.
         counts: Length of each array.
+
+    Returns:
+        Shifted indices of each array, of equal shapes.
     """
     firsts = np.cumsum([0, *counts[:-1]])
     return [(part + first).astype(np.int32) for part, first in zip(indices, firsts, strict=True)]

@@ -49,7 +49,15 @@ def swing_period(solder: Solder, angle: float | None = None) -> float:
 
 
 def largest_step(solder: Solder, spacing: float) -> tuple[float, str]:
-    """Return the upper bound of the time step [s] for a particle spacing [m], and the name of the bound."""
+    """Return the upper bound of the time step and the name of the bound.
+
+    Args:
+        solder: Fluid, and numerics with the limit as a multiple of the capillary limit.
+        spacing: Particle spacing [m].
+
+    Returns:
+        Time step [s], and "swing" (a share of the slowest period, with ispg) or "capillary multiple".
+    """
     largest = solder.numerics.time_step_limit * capillary_limit(solder.density, spacing, solder.surface_tension)
     of_swing = LONGEST_OF_SWING * swing_period(solder)
     if solder.numerics.scheme == "ispg" and largest > of_swing:

@@ -91,7 +91,15 @@ def cut_at_walls(
 
 
 def with_mirror_image(points: Floats, triangles: Indices) -> tuple[Floats, Indices]:
-    """Return vertices and triangles of a surface that ends on the wall z = 0, closed by its mirror image behind it."""
+    """Return a surface that ends on the wall z = 0, closed by its mirror image behind it.
+
+    Args:
+        points: Vertices, shape (n, 3) [m]; those of contact lines at z = 0 are shared with the image.
+        triangles: Triangles, shape (t, 3).
+
+    Returns:
+        Vertices, the given ones first, shape (m, 3) [m], and triangles, shape (2 t, 3).
+    """
     image = len(points) + np.arange(len(points), dtype=np.int32)
     for loop in boundary_loops(triangles):
         image[loop] = loop
@@ -106,9 +114,13 @@ def _loops(points: Floats, triangles: Indices, plate: Plate) -> list[Indices]:
 
 
 def boundary_loops(triangles: Indices) -> tuple[Indices, ...]:
-    """Return the closed loops of edges that belong to one triangle only, shape (k,) each.
+    """Return the closed loops of edges that belong to one triangle only.
 
-    Loops run in the sense of the edges of their triangles.
+    Args:
+        triangles: Consistently oriented triangles, shape (t, 3).
+
+    Returns:
+        Vertices of each loop, shape (k,), in the sense of the edges of their triangles, the first one not repeated.
 
     Raises:
         CannotRebuild: Loops meet in a vertex.

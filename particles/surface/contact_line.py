@@ -292,7 +292,11 @@ class ContactLine:
 
 
 def sector_areas(local: Floats) -> Floats:
-    """Return the areas of the triangles of the origin and each segment of a closed line (k, 2), shape (k,) [m^2]."""
+    """Return the signed areas of the triangles of the origin and each segment of a closed line, shape (k,) [m^2].
+
+    Args:
+        local: Vertices of the line in its plane, in order, shape (k, 2) [m]; positive areas are counter-clockwise.
+    """
     x, y = local.T
     return 0.5 * (x * ahead(y) - y * ahead(x))
 

@@ -38,7 +38,12 @@ class NewSurface:
 
 @njit(cache=True)
 def extreme_edges(points, triangles):
-    """Return the lengths of the shortest and the longest edge of triangles (t, 3) with vertices (n, 3) [m]."""
+    """Return the lengths of the shortest and the longest edge of a triangulation [m], in this order.
+
+    Args:
+        points: Vertices, shape (n, 3) [m].
+        triangles: Triangles, shape (t, 3); inf and 0 are returned without any.
+    """
     shortest, longest = np.inf, 0.0
     for a, b, c in triangles:
         for i, j in ((a, b), (b, c), (c, a)):

@@ -93,7 +93,13 @@ def _distance(nodes: "pyvista.DataSet", points: Floats, triangles: Indices) -> F
 
 
 def winding_numbers_on(grid: Grid, points: Floats, triangles: Indices) -> Indices:
-    """Return the winding numbers of a closed surface at the nodes of a grid, an array of its shape."""
+    """Return the winding numbers of a closed surface at the nodes of a grid, shape (i, j, k): 1 inside, 0 outside.
+
+    Args:
+        grid: Grid of nodes.
+        points: Vertices, shape (n, 3) [m].
+        triangles: Outward oriented triangles, shape (t, 3).
+    """
     numbers = np.zeros(grid.shape, np.int32)
     winding_numbers.on_grid(points, np.ascontiguousarray(triangles), grid.origin, grid.spacing, numbers)
     return numbers

@@ -101,12 +101,23 @@ def smooth_slits(level: LevelSet) -> LevelSet:
 
 
 def part_of_vertex(triangles: Indices, count: int) -> Indices:
-    """Return the number of the connected part of a surface that each vertex belongs to, shape (count,)."""
+    """Return the number of the connected part of a surface that each vertex belongs to, from 0, shape (count,).
+
+    Args:
+        triangles: Triangles, shape (t, 3).
+        count: Number of vertices; each vertex without triangles is a part of its own.
+    """
     return connected_groups(triangles.ravel(), np.roll(triangles, 1, axis=1).ravel(), count)
 
 
 def connected_groups(first: Indices, second: Indices, count: int) -> Indices:
-    """Return the number of the connected group of each of ``count`` items, given pairs (first[k], second[k])."""
+    """Return the number of the connected group of each item, counted from 0, shape (count,).
+
+    Args:
+        first: First item of each connected pair, shape (k,).
+        second: Second item of each pair, shape (k,).
+        count: Number of items, those without pairs included.
+    """
     graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(count, count))
     return connected_components(graph, directed=False)[1]
 

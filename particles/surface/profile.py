@@ -133,7 +133,11 @@ def fit_areas(areas: Callable[[Floats], Floats], low: float, high: float) -> Pro
 
 
 def mean_width(points: Floats) -> float:
-    """Return the horizontal width of a surface with vertices (m, 3) [m], averaged over directions [m]."""
+    """Return the horizontal width of a surface, averaged over directions [m].
+
+    Args:
+        points: Vertices, shape (m, 3) [m], z up.
+    """
     angles = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     along = points[:, :2] @ np.stack((np.cos(angles), np.sin(angles)))
     return float(np.ptp(along, axis=0).mean())

@@ -172,7 +172,13 @@ def _leaves_wall(mesh: SurfaceMesh, is_rising: bool) -> bool:
 
 
 def edge_changes(spacing: float) -> Sequence[Callable[[Floats, Indices, Sequence[Indices]], NewSurface]]:
-    """Return the functions that split long edges and collapse short ones, for a particle spacing [m]."""
+    """Return the functions that split long edges and collapse short ones, edges of contact lines included.
+
+    Each takes vertices (n, 3) [m], triangles (t, 3) and contact lines, and returns the changed triangulation.
+
+    Args:
+        spacing: Particle spacing, to which the limits of the lengths are proportional [m].
+    """
     long, short = LONGEST * EDGE * spacing, SHORTEST * EDGE * spacing
     return partial(split_long, longest=long, on_rings=True), partial(collapse_short, shortest=short, on_rings=True)
 
@@ -276,7 +282,13 @@ def _blunting(line: Floats) -> Floats:
 
 
 def is_folded(points: Floats, triangles: Indices, spacing: float) -> bool:
-    """Return whether sheets of a closed surface have crossed: a winding number is larger than 1 or negative."""
+    """Return whether sheets of a closed surface have crossed: a winding number is larger than 1 or negative.
+
+    Args:
+        points: Vertices, shape (m, 3) [m].
+        triangles: Outward oriented triangles, shape (t, 3).
+        spacing: Particle spacing, which sets the grid of the winding numbers [m].
+    """
     least, most = WindingNumbers.of(points, triangles, OVERLAP * spacing).bounds
     return most > 1 or least < 0
 

@@ -141,7 +141,7 @@ def measure(
     Args:
         request: Request of the user.
         folder: Folder of the store and the results.
-        compute: Function that computes points.
+        compute: Function of a store and points that makes their products and returns reasons of failure by key.
         study: Convergence study; None for the study of the case's kind.
 
     Returns:
@@ -268,7 +268,7 @@ def _failed(runner: StudyRunner) -> list[str]:
 
 
 def remark_unverified(accuracy: Accuracy) -> list[str]:
-    """Return a remark if the recommended settings were not run successfully."""
+    """Return one remark if the recommended settings were not run successfully, otherwise an empty list."""
     chosen = accuracy.recommended
     if chosen is None or tables.prediction(accuracy) is not None:
         return []
@@ -307,7 +307,12 @@ def _case(path: Path, settings: Mapping[str, str]) -> Case:
 
 
 def total(calibration: Calibration, case: Case) -> float:
-    """Return the predicted wall time of all stages of a case, corrected by measured times [s]."""
+    """Return the predicted wall time of all stages of a case, corrected by measured times [s].
+
+    Args:
+        calibration: Predicted and measured times of earlier runs.
+        case: Case to predict.
+    """
     return sum(calibration.corrected(stage, seconds) for stage, seconds in stage_seconds(case).items())
 
 
@@ -327,5 +332,10 @@ def _show_recommendation(accuracy: Accuracy, console: Console) -> None:
 
 
 def table(texts: dict, title: str) -> Table:
-    """Return head and rows of text as a table for the terminal."""
+    """Return a table for the terminal.
+
+    Args:
+        texts: Table with ``head`` (column titles) and ``rows`` (lists of text).
+        title: Title of the table.
+    """
     return text_table(f"\n{title}" if title else "", texts["head"], texts["rows"], remarks=texts.get("prose", False))

@@ -34,6 +34,9 @@ def expected_deflection(case: "BoardDropCase") -> Deflection:
     The board is a beam between its holes in its first mode, q'' + omega^2 q = 4/pi a(t): w = q sin(pi x/L).
     Width, package and higher modes are neglected.
 
+    Returns:
+        Largest deflection [m], largest slope, and angular frequency of the first mode [rad/s].
+
     Raises:
         PulseError: The table of the pulse cannot be read.
     """
@@ -50,6 +53,9 @@ def expected_duration(case: "BoardDropCase") -> float:
     After a pulse of duration t the board swings as if pushed at t / 2: the first peak is at t / 2 + T / 4, and half
     a swing after it is before t + 3 / 4 T. With finite rotations the board also stretches,
     w'' + omega^2 w (1 + c (w/h)^2) = 0, which shortens its period T.
+
+    Raises:
+        PulseError: The table of the pulse cannot be read.
     """
     longest, omega = longest_duration(case), first_mode(case)[1]
     if case.shock.duration != "auto":
@@ -80,6 +86,9 @@ def first_mode_peak(omega: float, velocity: Callable[[float], float], duration: 
         omega: Angular frequency [rad/s].
         velocity: Function of the time [s] that returns the integral of a from 0 to this time [m/s].
         duration: Duration of the response [s].
+
+    Returns:
+        Largest magnitude of the amplitude q [m].
     """
     duration = min(duration, MOST_PERIODS * math.tau / omega)
     count = max(SAMPLES, math.ceil(SAMPLES_A_PERIOD * omega * duration / math.tau))
@@ -98,6 +107,10 @@ def expected_peel(case: "BoardDropCase", deflection: Deflection) -> float:
     D and curvature K. The gap opens by d with D d^(4) + k d = 0, and d^(2) = K, d^(3) = 0 at the edge of the plate, so
     the pressure is p = k d = K sqrt(k D) there. Each joint is its solder in series with the laminate under both pads,
     a half-space of stiffness E a / (1 - nu^2) under a pad of diameter a.
+
+    Args:
+        case: Case of a board drop.
+        deflection: Estimate of ``expected_deflection``.
     """
     package, materials = case.package, case.materials
     diameter = 2.0 * min(package.board_pad.wetted_radius, package.package_pad.wetted_radius)
@@ -112,7 +125,9 @@ def expected_peel(case: "BoardDropCase", deflection: Deflection) -> float:
 
 
 def decided(case: "BoardDropCase") -> "BoardDropCase":
-    """Return the case with the duration, the kinematics and the solder that its scene calls for.
+    """Return a copy of a case in which ``auto`` settings of the shock have their decided values.
+
+    These are the duration, the kinematics ("small" or not), and whether the solder yields.
 
     Raises:
         PulseError: The table of the pulse cannot be read.

@@ -44,7 +44,10 @@ def bending_axis(case: "BoardDropCase") -> int:
 
 
 def fitted_mass(case: "BoardDropCase") -> float:
-    """Return an upper bound of the lumped masses and further packages [kg], mirror images included."""
+    """Return an upper bound of the lumped masses and further packages on the whole board [kg].
+
+    Mirror images are included.
+    """
     images = 4.0 if case.board.symmetry == "quarter" else 1.0
     roles = case.materials
     packages = sum(

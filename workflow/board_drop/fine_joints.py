@@ -60,12 +60,24 @@ class CoarseJoints(Effect["DropScene"]):
 
 
 def named_joints(coupling: "JointCoupling") -> FineJoints:
-    """Return the fine joints that a case names."""
+    """Return the fine joints that a case names, with the setting as reason.
+
+    Args:
+        coupling: Coupling whose ``fine_joints`` is "all" or a tuple of joint names.
+    """
     return FineJoints(coupling.fine_joints, f"{FINE} = {_in_words(coupling.fine_joints)}")
 
 
 def most_stressed(history: Path, count: int) -> FineJoints:
-    """Return the critical joints of a history, ranked by peel stress, or by plastic work if the solder yields."""
+    """Return the critical joints of a history, ranked by peel stress, or by plastic work if the solder yields.
+
+    Args:
+        history: File ``history.npz`` of a run with all joints coarse.
+        count: Number of joints to return.
+
+    Returns:
+        Names of the joints, the most stressed first, and a text with their peaks as reason.
+    """
     import numpy as np
 
     from reflowshock.fem.output.ranking import rank_joints, ranking_measure
@@ -82,7 +94,12 @@ def most_stressed(history: Path, count: int) -> FineJoints:
 
 
 def write_fine_joints(folder: Path, fine: FineJoints) -> None:
-    """Write ``fine_joints.json`` into the folder of a shock."""
+    """Write ``fine_joints.json`` into the folder of a shock.
+
+    Args:
+        folder: Folder of the shock, which must exist.
+        fine: Names of the fine joints, or "all", and the reason.
+    """
     (folder / "fine_joints.json").write_text(
         json.dumps({"names": fine.names, "why": fine.why}, indent=1) + "\n", encoding="utf-8"
     )

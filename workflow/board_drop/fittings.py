@@ -48,7 +48,7 @@ class DrawnBoard(Structure):
 
 
 def drawn_board(case: "BoardDropCase") -> DrawnBoard:
-    """Return the board of a case for geometric checks; its elements and material are arbitrary."""
+    """Return the mesh geometry of a case's board for geometric checks; its elements and material are placeholders."""
     board, holes = case.board, case.board.holes
     return DrawnBoard(
         centre=board.centre,
@@ -146,5 +146,5 @@ def in_mm(length: float) -> str:
 
 
 def fem_input(case: "BoardDropCase") -> dict:
-    """Return the fittings of a case in the input format of the package ``fem``."""
+    """Return the fittings of a case, such as masses, supports and gauges, as JSON data for the package ``fem``."""
     return case.model_dump(mode="json", include=set(BoardFittings.model_fields))

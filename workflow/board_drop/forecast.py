@@ -62,7 +62,12 @@ class PackageForecast:
 
 
 def forecast_package(case: PackageCase) -> PackageForecast:
-    """Predict sizes and cost of the reflow of a package."""
+    """Predict sizes and cost of the reflow of a package, without running it.
+
+    Returns:
+        Number and particles of the joints, effects, and wall time of each stage [s]; ``parts`` is empty, ``shock``
+        None.
+    """
     from reflowshock.particles.parameters.effects import decide_effects
     from reflowshock.particles.parameters.estimate import particle_count, reflow_seconds
 
@@ -100,7 +105,11 @@ def _heated(reflow: PackageForecast, case: PackageCase, thermal: Thermal) -> Pac
 
 
 def forecast_board_drop(case: BoardDropCase) -> PackageForecast:
-    """Predict sizes, time steps and cost of reflow and shock."""
+    """Predict sizes, time steps and cost of reflow and shock, without running them.
+
+    Returns:
+        As for ``forecast_package``, with the parts of the mesh and the forecast of the shock.
+    """
     reflow = forecast_package(case)
     share = expected_duration(case) / longest_duration(case)
     drop_effects, case = shock_effects(case), decided(case)
@@ -148,7 +157,15 @@ def step_problems(case: BoardDropCase) -> Iterator[Problem]:
 
 
 def with_critical_step(quality: dict, materials: Materials) -> dict:
-    """Return the quality of a joint mesh with its critical time step [s], from the shortest length in each material."""
+    """Return the quality of a joint mesh with its critical time steps, from the shortest length in each material.
+
+    Args:
+        quality: Measures of the mesh, among them ``smallest_length``: material role -> length [m].
+        materials: Materials by role.
+
+    Returns:
+        Copy with ``critical_time_step`` (the smallest) and ``critical_time_steps`` by role [s].
+    """
     import numpy as np
 
     from reflowshock.fem.estimates.estimate import box_critical_step
@@ -161,12 +178,20 @@ def with_critical_step(quality: dict, materials: Materials) -> dict:
 
 
 def package_size(case: PackageCase) -> Size:
-    """Predict time and memory of the stages of a package on one core."""
+    """Predict time and memory of the stages of a package on one core.
+
+    Returns:
+        Seconds by stage, number of joints that can be computed at the same time, and memory [B].
+    """
     return _size(forecast_package(case))
 
 
 def board_drop_size(case: BoardDropCase) -> Size:
-    """Predict time and memory of the stages of a board drop on one core."""
+    """Predict time and memory of the stages of a board drop on one core.
+
+    Returns:
+        Seconds by stage, number of joints that can be computed at the same time, and memory [B].
+    """
     return _size(forecast_board_drop(case))
 
 

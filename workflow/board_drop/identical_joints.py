@@ -20,7 +20,7 @@ PREFIX = "identical_"  # begins the names of meshes and metrics of identical joi
 
 
 def identical_sphere(case: "PackageCase") -> "TruncatedSphere":
-    """Return the truncated sphere of the solder's volume between the wetted discs of the pads."""
+    """Return the truncated sphere of the solder's volume between the wetted discs of the pads, equal for all joints."""
     from reflowshock.meshing.surface.truncated_sphere import TruncatedSphere
 
     board, package = case.package.board_pad, case.package.package_pad
@@ -68,6 +68,9 @@ def shape_effect(real: float, identical: float) -> float | None:
     Args:
         real: Peak stress with real joints [Pa].
         identical: Peak stress with identical joints [Pa]; without a positive one the result is None.
+
+    Returns:
+        ``real / identical - 1``, or None.
     """
     return real / identical - 1.0 if identical > 0.0 else None
 

@@ -26,7 +26,15 @@ if TYPE_CHECKING:
 
 
 def write_surfaces(run: Run[PackageCase], folder: Path) -> dict[str, dict]:
-    """Write the closed surface of each joint, one for a bridged pair; return the measures of the surfaces.
+    """Write the closed surface of each joint; return the measures of the surfaces.
+
+    Args:
+        run: Case, and run folder from which the products of the reflow are read.
+        folder: Folder into which ``<joint>.vtu`` is written, one file for a bridged pair ("A9+A10.vtu").
+
+    Returns:
+        Measures by joint name: ``volume`` [m^3] and other sizes, with ``volume_error``, the relative error against the
+        reflow; for a user's surface ``given`` (file) and ``volume_change``.
 
     Raises:
         ReflowError: A joint is open.
@@ -80,7 +88,7 @@ def mesh_real_joints(case: PackageCase, run_folder: Path, folder: Path, *, coars
     Args:
         case: Case of a package.
         run_folder: Run folder with the products of the preceding stages.
-        folder: Folder for the meshes.
+        folder: Folder into which assembly, joint meshes and qualities are written.
         coarse: Whether each joint is also meshed coarse.
 
     Returns:
@@ -114,7 +122,7 @@ def mesh_identical_joints(run: Run[BoardDropCase], folder: Path, *, coarse: bool
 
     Args:
         run: Case, and run folder with the flat assembly.
-        folder: Folder for the meshes.
+        folder: Folder into which assembly, joint meshes and qualities are written.
         coarse: Whether each joint is also meshed coarse.
 
     Returns:
@@ -208,6 +216,9 @@ def mesh_bridges(
         sites: Pad sites of all joints by name.
         case: Case with package and symmetry.
         side: Underside of the package.
+
+    Returns:
+        Mesh of each bridged pair; pairs that cannot be meshed are left out with a warning.
     """
     from reflowshock.meshing.joint.solder_mesh import JointMeshError, mesh_bridge
 

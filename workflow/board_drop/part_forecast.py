@@ -46,14 +46,14 @@ Parts = Mapping[str, PartForecast]
 
 
 def forecast_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
-    """Estimate every part of the mesh with all joints fine."""
+    """Return the forecast of every part of the mesh with all joints fine, by name such as "solder_coarse"."""
     from reflowshock.meshing.board.estimate import count_elements
 
     return _forecasts(case, count_elements(case.package, case.board, case.warpage))
 
 
 def two_scale_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
-    """Estimate every part of a two-scale run; for a one-way run, the parts of both models."""
+    """Return the forecast of every part of a two-scale run by name; for a one-way run, the parts of both models."""
     from reflowshock.meshing.board.estimate import count_elements
 
     if case.shock.coupling.direction == "one_way":
@@ -62,7 +62,7 @@ def two_scale_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
 
 
 def coarse_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
-    """Estimate every part of the mesh with all joints coarse."""
+    """Return the forecast of every part of the mesh with all joints coarse, by name."""
     from reflowshock.meshing.board.estimate import count_elements
 
     return _forecasts(case, count_elements(case.package, case.board, case.warpage, 0))
@@ -132,7 +132,11 @@ def _joint_shapes(case: "BoardDropCase", name: str, part: "PartEstimate") -> "ND
 
 
 def is_linear(parts: Parts) -> bool:
-    """Return whether the forces of all parts are linear."""
+    """Return whether the forces of all parts are linear.
+
+    Args:
+        parts: Forecast of each part by name.
+    """
     return all(part.linear for part in parts.values())
 
 
@@ -151,7 +155,7 @@ def _in_boxes(case: "BoardDropCase", name: str, part: "PartEstimate") -> float:
 
 
 def relative_cost(case: "BoardDropCase", part: str) -> float:
-    """Return the cost of an update of an element of a part, in updates of a linear element."""
+    """Return the cost of an update of one element of a part, relative to a linear elastic element (1.0)."""
     from reflowshock.fem.estimates.estimate import UPDATES_PER_SECOND
     from reflowshock.fem.estimates.solver_cost import NONLINEAR_RATE, TURNING_BOX_RATE, TURNING_RATE
 
@@ -170,7 +174,12 @@ def _warped(case: "BoardDropCase") -> bool:
 
 
 def turns(case: "BoardDropCase", part: str) -> bool:
-    """Return whether a part is elastic and corotational."""
+    """Return whether a part is elastic and computed with the corotational formulation, for finite rotations.
+
+    Args:
+        case: Case with decided kinematics.
+        part: Name of the part.
+    """
     return case.shock.numerics.kinematics == "corotational" and material_of(case, part).plasticity is None
 
 
@@ -180,7 +189,11 @@ def is_linear_part(case: "BoardDropCase", part: str) -> bool:
 
 
 def role_of(part: str) -> str:
-    """Return the material role of a part: its name up to "@", then up to "_"."""
+    """Return the material role of a part: its name up to "@", then up to "_".
+
+    Args:
+        part: Name of the part, such as "solder_coarse" with the role "solder".
+    """
     return part.split("@")[0].split("_")[0]
 
 

@@ -22,6 +22,9 @@ def package_tables(case: PackageCase, outlook: PackageForecast) -> Iterator[Rend
     Args:
         case: Case of a package.
         outlook: Forecast of the case.
+
+    Yields:
+        Lines of text for the terminal.
     """
     yield f"\n{_joints(case, outlook)}"
     yield style_text("\n[dim]{}", REFLOW_SPEED)
@@ -33,6 +36,9 @@ def board_drop_tables(case: BoardDropCase, outlook: PackageForecast) -> Iterator
     Args:
         case: Case of a board drop.
         outlook: Forecast of the case, with its shock.
+
+    Yields:
+        Tables and lines of text for the terminal.
     """
     assert outlook.shock is not None
     yield _sizes(case, outlook)

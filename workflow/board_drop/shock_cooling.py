@@ -44,9 +44,12 @@ def with_initial_stress(run: Run[BoardDropCase], folder: Path, request: dict, pr
 
     Args:
         run: Case and cores; without residual stress the request is returned as it is.
-        folder: Folder of the shock.
+        folder: Folder of the shock, in which the cooling is computed in a subfolder.
         request: Input of the package ``fem`` for the mode.
         prefix: Prefix of the mesh names of the mode; empty for real joints.
+
+    Returns:
+        Copy of the request that names the file of the initial stress, or the request itself without residual stress.
 
     Raises:
         LaunchError: The run failed; the message contains its last lines.
@@ -62,7 +65,12 @@ def with_initial_stress(run: Run[BoardDropCase], folder: Path, request: dict, pr
 
 
 def cooling_name(request: dict, prefix: str) -> str:
-    """Return the name of the folder with the cooling of a mode; modes with all joints fine share one."""
+    """Return the name of the folder with the cooling of a mode; modes with all joints fine share one.
+
+    Args:
+        request: Input of the package ``fem`` for the mode; ``mode`` and ``shock.coupling.fine_joints`` are read.
+        prefix: Prefix of the mesh names of the mode; empty for real joints.
+    """
     return f"{prefix}residual" + ("" if request["shock"]["coupling"]["fine_joints"] == "all" else f"_{request['mode']}")
 
 
@@ -112,7 +120,7 @@ def with_cooling(findings: Findings, case: BoardDropCase, folder: Path) -> Findi
 
 
 def effect(case: BoardDropCase) -> dict:
-    """Return the decision on residual stress by the name of the effect; empty for a case without ``[thermal]``."""
+    """Return the decision on residual stress (``on``, ``why``) by effect name; empty without ``[thermal]``."""
     thermal = case.thermal
     if thermal is None:
         return {}

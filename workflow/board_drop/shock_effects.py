@@ -14,17 +14,29 @@ SHOCK_EFFECTS: tuple[Effect[DropScene], ...] = (*DROP_EFFECTS, *OF_JOINTS)
 
 
 def shock_effects(case: BoardDropCase) -> dict[str, Decision]:
-    """Decide the effects of a shock."""
+    """Return the decision on each effect of a shock by name: ``on``, ``why`` and, if predicted, ``influence``."""
     return decide_all(SHOCK_EFFECTS, DropScene(case))
 
 
 def of_joint_meshes(case: BoardDropCase) -> dict[str, Decision]:
-    """Decide on coarse and identical joints, the effects that add joint meshes."""
+    """Decide on coarse and identical joints, the effects that add joint meshes.
+
+    Returns:
+        Name of an effect -> its decision (``on``, ``why``).
+    """
     return decide_all(OF_JOINTS, DropScene(case))
 
 
 def with_influence(effects: dict, case: BoardDropCase) -> dict[str, Any]:
-    """Return the effects of a run with their predicted influence, where there is a prediction."""
+    """Return the effects of a run with their predicted influence, where there is a prediction.
+
+    Args:
+        effects: Name of an effect -> its record in a run (``on``, ``why``); not changed.
+        case: Case of the run.
+
+    Returns:
+        Records by name, with ``influence``, the expected relative change of the result, where it is predicted.
+    """
     predicted = shock_effects(case)
     by_name: dict[str, Any] = {
         name: predicted.get(f"{name}_in_the_shock", predicted.get(name)) or {} for name in effects

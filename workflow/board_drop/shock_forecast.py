@@ -119,8 +119,11 @@ def forecast_shock(case: "BoardDropCase", parts: Parts, share: float = 1.0) -> S
 
     Args:
         case: Case of a board drop.
-        parts: Parts of the mesh with all joints fine.
-        share: Expected share of the longest duration.
+        parts: Forecast of each part of the mesh by name, with all joints fine.
+        share: Expected duration of the run over its longest duration, 0 to 1.
+
+    Returns:
+        Scheme, step levels, and wall times of the two-scale run and of the DNS.
 
     Raises:
         CaseError: The critical steps differ by more than ``shock.coupling.levels`` levels allow.
@@ -160,7 +163,13 @@ def forecast_shock(case: "BoardDropCase", parts: Parts, share: float = 1.0) -> S
 
 
 def seconds_outside_windows(case: "BoardDropCase", parts: Parts, share: float = 1.0) -> float:
-    """Predict the wall time [s] of start, set-up and samples of a run that takes ``share`` of all samples."""
+    """Predict the wall time of start, set-up and output of a run [s], all that is not spent in time steps.
+
+    Args:
+        case: Case of a board drop.
+        parts: Forecast of each part of the mesh by name.
+        share: Share of all output samples that the run writes, 0 to 1.
+    """
     elements, numerics = sum(part.elements for part in parts.values()), case.shock.numerics
     histories, fields = share * numerics.history_samples, share * numerics.field_samples
     shared = elements / case.shock.ranks.total * (histories * SAMPLE_SECONDS + fields * FIELD_SECONDS)
@@ -207,10 +216,11 @@ def shorter_than_window(case: "BoardDropCase") -> Iterator[Problem]:
 
 
 def estimate_mesh(case: "BoardDropCase", parts: Parts) -> "MeshEstimate":
-    """Return the estimated mesh that the division needs, from the forecast parts.
+    """Return the estimated mesh from which step levels and models are decided, one row per part or layer of a part.
 
-    Both layers of solder at the pads are separate rows: copper touches the first, which touches the second. Other
-    rows are assumed not to touch.
+    Args:
+        case: Case of a board drop.
+        parts: Forecast of each part of the mesh by name.
     """
     import numpy as np
 

@@ -28,6 +28,10 @@ def find_fine_joints(run: Run[BoardDropCase], folder: Path) -> FineJoints:
 
     That run, in the folder ``coarse``, is a two-scale run as well, because the board then keeps its large step.
 
+    Args:
+        run: Run folder with assembly and joints, case, cores.
+        folder: Folder of the shock, into which the coarse run and ``fine_joints.json`` are written.
+
     Raises:
         LaunchError: The run failed; the message contains its last lines.
     """
@@ -99,7 +103,14 @@ def _request(run: Run[BoardDropCase], mode: str, meshes: tuple[str, ...], coupli
 
 
 def read_results(folder: Path) -> dict[str, dict]:
-    """Return ``result.json`` of each mode that ran, two-scale first."""
+    """Return ``result.json`` of each mode that ran, two-scale first.
+
+    Args:
+        folder: Folder of the shock, with a folder for each mode.
+
+    Returns:
+        Mode -> content of its ``result.json`` (``model``, ``metrics``, ``health``, ``timings``, ``coupling``).
+    """
     return {
         mode: json.loads((folder / mode / "result.json").read_text(encoding="utf-8"))
         for mode in MODES

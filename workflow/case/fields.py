@@ -31,7 +31,7 @@ TAG_KEYS = ("kind", "method")  # keys whose value selects the model of a table
 
 
 def holds_named_tables(field: FieldInfo) -> bool:
-    """Return whether a field is a table of tables with user-defined names, such as the layers of a structure."""
+    """Return whether a field is a table of tables with user-defined names, such as a structure's layers."""
     return typing.get_origin(field.annotation) is dict
 
 
@@ -44,7 +44,15 @@ def models_of(field: FieldInfo) -> tuple[type[BaseModel], ...]:
 
 
 def model_of(field: FieldInfo, table: dict) -> type[BaseModel] | None:
-    """Return the model of a table; if a field has several models, the one with the tag of the table."""
+    """Return the model of a table; if a field has several models, the one with the tag of the table.
+
+    Args:
+        field: Field of a parameter model.
+        table: Table of the case file; its tag is the value of ``kind`` or ``method``, else the default's.
+
+    Returns:
+        Model of the table; None for a field without models or an unknown tag.
+    """
     models = models_of(field)
     if len(models) < 2:
         return models[0] if models else None
@@ -59,7 +67,7 @@ def tag_key(model: type[BaseModel]) -> str:
 
 
 def tag_of(model: type[BaseModel]) -> str:
-    """Return the tag that identifies a model among the models of a table."""
+    """Return the value of the tag (``kind`` or ``method``) that selects a model, such as "pulse"."""
     return str(typing.get_args(model.model_fields[tag_key(model)].annotation)[0])
 
 
@@ -168,7 +176,12 @@ def _of_table(field: FieldInfo, value: object, key: str, problems: list[Problem]
 
 
 def leaves(parameters: BaseModel, prefix: str = "") -> Iterator[tuple[str, object, FieldInfo]]:
-    """Yield dotted key, SI value and field of every parameter, in the order of the models."""
+    """Yield dotted key, SI value and model field of every parameter, in the order of the models.
+
+    Args:
+        parameters: Case or one of its tables.
+        prefix: Dotted key of the table with its dot, or empty for the case.
+    """
     for name, field in type(parameters).model_fields.items():
         value = getattr(parameters, name)
         if isinstance(value, BaseModel):
@@ -194,7 +207,12 @@ def display(value: object, field: FieldInfo) -> str:
 
 
 def as_written(value: object, field: FieldInfo | None) -> object:
-    """Return an SI value as text in the user's unit if its field is a quantity, otherwise the value itself."""
+    """Return an SI value as text in the user's unit if its field is a quantity, otherwise the value itself.
+
+    Args:
+        value: SI value; None is returned as it is.
+        field: Field of the value; None for a value without one.
+    """
     return display(value, field) if value is not None and field is not None and quantity_of(field) else value
 
 
@@ -222,5 +240,9 @@ def _is_union(annotation: object) -> bool:
 
 
 def display_values(case: BaseModel) -> dict[str, str]:
-    """Return every parameter that has a value as dotted key -> text in the user's unit."""
+    """Return every parameter that has a value: dotted key -> value as text in the user's unit.
+
+    Args:
+        case: Case or one of its tables.
+    """
     return {key: display(value, field) for key, value, field in leaves(case) if value is not None}

@@ -14,10 +14,15 @@ Name = Annotated[str, Field(pattern=NAME)]
 
 
 def is_name(text: object) -> bool:
-    """Return whether a value is a valid name."""
+    """Return whether a value is a valid name of a user-defined table: a text that matches ``NAMES``."""
     return isinstance(text, str) and _NAME.fullmatch(text) is not None
 
 
 def wrong_name(key: str, text: object) -> Problem:
-    """Return the problem for an invalid name."""
+    """Return the problem that reports an invalid name.
+
+    Args:
+        key: Dotted key of the table that contains the name.
+        text: The invalid name.
+    """
     return Problem(key, "is not a valid name", text, NAMES)

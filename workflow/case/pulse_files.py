@@ -12,7 +12,7 @@ def unreadable_pulses(tables: Tables) -> Iterator[Problem]:
     """Yield a problem for each table that cannot be read.
 
     Args:
-        tables: File, quantity and column title (None for single columns), by key.
+        tables: Dotted key -> path of the table, its quantity, and column title (None for a table with a single column).
 
     Yields:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
@@ -29,7 +29,14 @@ def unreadable_pulses(tables: Tables) -> Iterator[Problem]:
 
 
 def largest_values(tables: Tables) -> Iterator[tuple[str, str, float]]:
-    """Yield key, SI unit and magnitude of the last time and of the largest value of each table that can be read."""
+    """Yield the last time and the largest value of each table that can be read.
+
+    Args:
+        tables: Dotted key -> path of the table, its quantity, and column title (None for a table with a single column).
+
+    Yields:
+        Two items per table: dotted key, SI unit ("s" for the time), magnitude.
+    """
     from reflowshock.fem.errors import PulseError
     from reflowshock.fem.loads.pulse_table import QUANTITIES, read_pulse
 

@@ -56,17 +56,30 @@ StageFunction = Callable[[Run[Any], Path], Findings]
 
 
 def metric(value: float | str, unit: str = "") -> dict:
-    """Return a metric; its unit is SI."""
+    """Return a metric as a record with ``value`` and ``unit``, as in ``summary.json``.
+
+    Args:
+        value: Number in SI units, or a text.
+        unit: SI unit; empty for ratios and texts.
+    """
     return {"value": value, "unit": unit}
 
 
 def at_most(value: float, limit: float) -> dict:
-    """Return a health check that passes if the value does not exceed its limit; nan fails."""
+    """Return a health check that passes if the value does not exceed its limit; nan fails.
+
+    Returns:
+        Record with ``value``, ``limit`` and ``ok``, as in ``summary.json``.
+    """
     return {"value": value, "limit": limit, "ok": bool(value <= limit)}
 
 
 def at_least(value: float, limit: float) -> dict:
-    """Return a health check that passes if the value is not below its limit; nan fails."""
+    """Return a health check that passes if the value is not below its limit; nan fails.
+
+    Returns:
+        Record with ``value``, ``limit`` and ``ok``, as in ``summary.json``.
+    """
     return {"value": value, "limit": limit, "ok": bool(value >= limit)}
 
 
@@ -77,6 +90,10 @@ def worst(values: Iterable[float]) -> float:
 
 
 def in_words_continued(results: Mapping[str, dict]) -> str:
-    """Return a text about the runs that continued from a checkpoint, or an empty string."""
+    """Return a text about the runs that continued from a checkpoint; empty if none did.
+
+    Args:
+        results: Name of a run -> content of its ``result.json``; ``continued_from`` is the number of a window.
+    """
     windows = {name: result.get("continued_from", 0) for name, result in results.items()}
     return ", ".join(f"{name} from window {window}" for name, window in windows.items() if window)

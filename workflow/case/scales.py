@@ -25,7 +25,7 @@ def take_scales(table: dict, problems: list[Problem]) -> dict[str, dict[str, obj
         problems: List to which errors are added.
 
     Returns:
-        Values by dotted key, by name of the scale.
+        Name of a scale -> its values by dotted key.
     """
     tables = table.pop("scales", {})
     if not isinstance(tables, dict):
@@ -57,7 +57,13 @@ def is_key(text: str) -> bool:
 
 
 def choose(name: object, scales: dict[str, dict[str, object]], problems: list[Problem]) -> dict[str, object]:
-    """Return the values of a scale by dotted key: empty for ``full``; add a problem for an unknown scale."""
+    """Return the values of a scale by dotted key: empty for ``full``; add a problem for an unknown scale.
+
+    Args:
+        name: Name of the scale as the user wrote it.
+        scales: Name of a scale -> its values by dotted key, without ``full``, which changes nothing.
+        problems: List to which an unknown scale is added.
+    """
     if isinstance(name, str) and (name == FULL or name in scales):
         return scales.get(name, {})
     names = [FULL, *scales]
@@ -68,14 +74,23 @@ def choose(name: object, scales: dict[str, dict[str, object]], problems: list[Pr
 
 
 def scales_text(scales: dict[str, dict[str, object]]) -> Iterator[str]:
-    """Write scales as tables of a case file, one text each."""
+    """Write scales as tables of a case file, one text each.
+
+    Args:
+        scales: Name of a scale -> its values by dotted key.
+    """
     for name, values in scales.items():
         lines = [f"{as_toml(key)} = {as_toml(value)}" for key, value in values.items()]
         yield "\n".join([f'# Values that change with --set scale="{name}".', f"[scales.{name}]", *lines, ""])
 
 
 def dotted(values: dict, prefix: str = "") -> Iterator[tuple[str, object]]:
-    """Yield dotted key and value of a table of tables."""
+    """Yield dotted key and value of every entry of nested tables that is not a table itself.
+
+    Args:
+        values: Nested tables.
+        prefix: Prefix of all keys, with its dot.
+    """
     for key, value in values.items():
         if isinstance(value, dict):
             yield from dotted(value, f"{prefix}{key}.")
@@ -84,7 +99,7 @@ def dotted(values: dict, prefix: str = "") -> Iterator[tuple[str, object]]:
 
 
 def override_value(text: str) -> object:
-    """Parse the value of a setting as TOML, where quotes may be omitted."""
+    """Parse the value of a ``--set`` option as TOML; text that is not valid TOML is returned as it is."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except (ValueError, RecursionError):

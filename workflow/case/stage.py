@@ -75,6 +75,11 @@ class Pipeline:
 
 
 def report_of(*follows: str, parameters: tuple[str, ...] = ()) -> Stage:
-    """Return the report stage of a pipeline; ``parameters`` are dotted keys that its verdicts depend on."""
+    """Return the report stage of a pipeline.
+
+    Args:
+        follows: Names of the stages whose products it reads.
+        parameters: Dotted keys that its verdicts depend on.
+    """
     pages = tuple(f"report/{name}" for name in PAGE)
     return Stage("report", ("case", "scale", *parameters), follows, pages, on_top=PAGE)

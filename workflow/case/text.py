@@ -19,7 +19,11 @@ SHOWN = {
 
 
 def quantity(metric: dict) -> str:
-    """Format a metric in a readable unit: stresses in MPa or kPa, lengths in mm or µm, small forces in mN."""
+    """Format a metric in a readable unit: stresses in MPa or kPa, lengths in mm or µm, small forces in mN.
+
+    Args:
+        metric: Record with ``value`` and its SI ``unit``; a text is returned as it is.
+    """
     value, unit = metric["value"], metric["unit"]
     if isinstance(value, str):
         return value
@@ -28,7 +32,12 @@ def quantity(metric: dict) -> str:
 
 
 def readable(unit: str, size: float) -> tuple[float, str]:
-    """Return factor and name of a readable unit for values of a magnitude in an SI unit."""
+    """Return factor and name of a readable unit, such as (1e-6, "MPa").
+
+    Args:
+        unit: SI unit.
+        size: Magnitude of the value in this unit, which decides on the prefix.
+    """
     smaller = ((factor, display_unit) for least, factor, display_unit in LESS.get(unit, ()) if 0.0 < size < least)
     return next(smaller, SHOWN.get(unit, (1.0, unit)))
 
@@ -39,7 +48,7 @@ def spelled(unit: str) -> str:
 
 
 def number(value) -> str:
-    """Format a number with four significant digits."""
+    """Format a number with four significant digits; integers with all digits, texts and None as ``str`` does."""
     if isinstance(value, bool | str) or value is None:
         return str(value)
     if isinstance(value, int):
@@ -48,17 +57,17 @@ def number(value) -> str:
 
 
 def nano(seconds: float | None) -> str:
-    """Format seconds as nanoseconds."""
+    """Format seconds as nanoseconds; None as a dash."""
     return "–" if seconds is None else f"{1e9 * seconds:.3g} ns"
 
 
 def micro(value: float) -> str:
-    """Format metres as micrometres with four digits."""
+    """Format metres as micrometres with four digits, without the unit."""
     return _four_digits(1e6 * value)
 
 
 def mega(value: float) -> str:
-    """Format pascals as megapascals with four digits."""
+    """Format pascals as megapascals with four digits, without the unit."""
     return _four_digits(1e-6 * value)
 
 
@@ -75,7 +84,12 @@ def percent(value: float) -> str:
 
 
 def against_limit(name: str, check: dict) -> tuple[str, str]:
-    """Return value and limit of a health check as text."""
+    """Return value and limit of a health check as text.
+
+    Args:
+        name: Name of the check, which decides on the unit.
+        check: Record with ``value`` and ``limit``.
+    """
     unit = next((unit for pattern, unit in CHECK_UNITS.items() if re.fullmatch(pattern, name)), "")
     value, limit = (quantity({"value": check[key], "unit": unit}) for key in ("value", "limit"))
     return value, limit

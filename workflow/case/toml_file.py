@@ -59,7 +59,11 @@ def parse_toml(source: str, text: str) -> dict:
 
 
 def read_toml(path: Path) -> dict:
-    """Read a TOML file; errors as ``read_text`` and ``parse_toml``."""
+    """Read a TOML file.
+
+    Raises:
+        CaseError: The file cannot be read as text, or is not TOML; see ``read_text`` and ``parse_toml``.
+    """
     return parse_toml(str(path), read_text(path))
 
 
@@ -79,7 +83,7 @@ def is_too_deep(value: object) -> bool:
 
 
 def fault_of(path: Path, most_bytes: int) -> str:
-    """Return why a path is not a readable file of at most ``most_bytes`` bytes, or an empty string."""
+    """Return why a path is not a readable file of at most ``most_bytes`` bytes; empty if it is one."""
     try:
         status = path.stat()
     except FileNotFoundError:

@@ -23,13 +23,23 @@ class Place:
 
 
 def place_of_error(error: tomllib.TOMLDecodeError, text: str) -> Place:
-    """Return the position of a TOML error, or the end of the text if the error has none."""
+    """Return line and column of a TOML error; the end of the text if the error has none.
+
+    Args:
+        error: Error of ``tomllib``.
+        text: The parsed text.
+    """
     match = AT.search(str(error))
     return Place(int(match[1]), int(match[2])) if match else Place(text.count("\n") + 1, 1)
 
 
 def toml_fault(error: tomllib.TOMLDecodeError, text: str) -> tuple[str, str]:
-    """Return key (or an empty string) and message of a TOML error, without its position."""
+    """Return key (or an empty string) and message of a TOML error, without its position.
+
+    Args:
+        error: Error of ``tomllib``.
+        text: The parsed text.
+    """
     message = AT.sub("", str(error)).strip()
     has_value = "this key already has a value"
     if names := NAMES.search(message):

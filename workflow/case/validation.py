@@ -16,16 +16,16 @@ RANGES = ("greater_than", "greater_than_equal", "less_than", "less_than_equal", 
 
 
 def translate(model: type[BaseModel], error: ValidationError, table: dict, reported: set[str]) -> list[Problem]:
-    """Translate validation errors.
+    """Translate validation errors of pydantic to problems in the words of the case file.
 
     Args:
-        model: The validated model.
+        model: The validated model of the case.
         error: Error of pydantic.
         table: Table as written by the user.
-        reported: Keys with a problem already reported, which are skipped.
+        reported: Dotted keys with a problem already reported, which are skipped.
 
     Returns:
-        One problem per key.
+        One ``Problem`` (dotted key, message, value, allowed values) per key.
     """
     problems: dict[str, Problem] = {}
     for record in error.errors():

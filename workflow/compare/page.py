@@ -43,7 +43,11 @@ def _table(table: dict) -> Table:
 
 
 def write(runs: Sequence[ComparedRun], path: Path) -> None:
-    """Write the page.
+    """Write the HTML page of a comparison; an existing page of this command is replaced.
+
+    Args:
+        runs: Two or more runs.
+        path: File to write.
 
     Raises:
         CaseError: The file exists and was not written by this command, or its folder does not exist.
@@ -67,7 +71,11 @@ def write(runs: Sequence[ComparedRun], path: Path) -> None:
 
 
 def histories(runs: Sequence[ComparedRun]) -> list[Chart]:
-    """Return charts of common histories: board centre, critical joint of the first run, watch points."""
+    """Return charts of common histories: board centre, critical joint of the first run, watch points.
+
+    Returns:
+        Interactive charts for the report page.
+    """
     from reflowshock.fem.output.ranking import PEEL, critical_joint
     from reflowshock.workflow.report.histories import joint_stress
 

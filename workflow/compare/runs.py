@@ -85,7 +85,14 @@ def _read(folder: Path, name: str) -> ComparedRun:
 
 
 def parameters(runs: Sequence[ComparedRun]) -> dict:
-    """Return the table of parameters in which the runs differ, one column per run."""
+    """Return the table of parameters in which the runs differ, one column per run.
+
+    Args:
+        runs: Two or more runs.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text); missing values are "–".
+    """
     values = [display_values(run.case) for run in runs]
     keys = dict.fromkeys(key for texts in values for key in texts if not key.startswith("case."))
     rows = [[key, *(texts.get(key, NONE) for texts in values)] for key in keys]
@@ -93,7 +100,14 @@ def parameters(runs: Sequence[ComparedRun]) -> dict:
 
 
 def results(runs: Sequence[ComparedRun]) -> dict:
-    """Return the table of verdicts and metrics, the most important first, with changes relative to the first run."""
+    """Return the table of verdicts and metrics, the most important first, with changes relative to the first run.
+
+    Args:
+        runs: Two or more runs.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text); missing values are "–".
+    """
     metrics = [run.summary["metrics"] for run in runs]
     names = dict.fromkeys([*FIRST, *(name for run_metrics in metrics for name in run_metrics)])
     rows = [
@@ -108,12 +122,24 @@ def results(runs: Sequence[ComparedRun]) -> dict:
 
 
 def select_differing(table: Mapping[str, Any]) -> dict:
-    """Return a table with only the rows in which columns differ."""
+    """Return a table with only the rows in which columns differ.
+
+    Args:
+        table: Table with ``head`` (column titles) and ``rows`` (lists of text), whose first column is a name.
+    """
     return {"head": table["head"], "rows": [row for row in table["rows"] if len(set(row[1:])) > 1]}
 
 
 def joints(runs: Sequence[ComparedRun]) -> dict | None:
-    """Return the table of peak peel stress of all common joints, ordered by the first run; None without a shock."""
+    """Return the table of peak peel stress of all common joints, ordered by the first run; None without a shock.
+
+    Args:
+        runs: Two or more runs.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text), with the rank of the joint in each run in the
+        last column; None without a shock.
+    """
     from reflowshock.workflow.report.histories import peel_peaks
 
     if not all("peel_board" in run.history for run in runs):

@@ -26,7 +26,7 @@ class Host:
 
 
 def this_host() -> Host:
-    """Return the machine on which this process runs."""
+    """Return processor and number of usable cores of the machine on which this process runs."""
     return Host(_model() or platform.processor() or platform.machine(), available_cores())
 
 
@@ -189,7 +189,7 @@ def _fit(
 
 
 def write_accuracy(folder: Path, accuracy: Accuracy) -> None:
-    """Write ``accuracy.json``."""
+    """Write a convergence study to ``accuracy.json`` in a folder; an existing file is replaced."""
     folder.mkdir(parents=True, exist_ok=True)
     partial = folder / f".{FILE}.partial"
     partial.write_text(json.dumps(asdict(accuracy), indent=1) + "\n", encoding="utf-8")
@@ -197,7 +197,11 @@ def write_accuracy(folder: Path, accuracy: Accuracy) -> None:
 
 
 def read_accuracy(path: Path) -> Accuracy | None:
-    """Read ``accuracy.json``; return None if it is missing or was written by a version with other fields."""
+    """Read ``accuracy.json``; return None if it is missing or was written by a version with other fields.
+
+    Args:
+        path: Path of the file.
+    """
     if not path.is_file():
         return None
     try:

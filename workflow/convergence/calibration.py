@@ -38,7 +38,11 @@ class Calibration:
 
 
 def calibration_from_runs(runs: Iterable[Mapping[str, StageCost]]) -> Calibration:
-    """Return the calibration by runs, each a mapping from stage to cost."""
+    """Return the pairs of predicted and measured wall times that correct further predictions.
+
+    Args:
+        runs: Stage -> measured and predicted cost, for each run; empty for a failed run.
+    """
     completed = [stages for stages in runs if stages]
     pairs: dict[str, list[tuple[float, float]]] = {}
     for stages in completed:
@@ -59,7 +63,7 @@ def default_folder(case: Case) -> Path:
 
 
 def calibration_from_study(case: Case) -> Calibration | None:
-    """Return the calibration by the convergence study of a case; None if it was not run on this machine."""
+    """Return the corrections of predicted times by the study of a case; None if it was not run on this machine."""
     accuracy = read_accuracy(default_folder(case) / FILE)
     if accuracy is None or accuracy.machine != this_host():
         return None
@@ -67,7 +71,12 @@ def calibration_from_study(case: Case) -> Calibration | None:
 
 
 def calibration_from_store(store: Store, stages: Iterable[str]) -> Calibration:
-    """Return the calibration by earlier uninterrupted stages in a store on this machine."""
+    """Return the corrections of predicted times by earlier uninterrupted stages in a store on this machine.
+
+    Args:
+        store: Store whose records are read.
+        stages: Names of the stages.
+    """
     machine = str(this_host())
     return calibration_from_runs(
         {stage: StageCost(record["seconds"], record["core_seconds"], record.get("forecast"))}

@@ -34,7 +34,12 @@ def read_case_accuracy(run_folder: Path, case: Case) -> Accuracy | None:
 
 
 def is_current(accuracy: Accuracy, case: Case) -> bool:
-    """Return whether a study was run with the present inputs of a case and this version of the program."""
+    """Return whether a study was run with the present inputs of a case and this version of the program.
+
+    Args:
+        accuracy: Study, whose key identifies the inputs.
+        case: Case as it is now.
+    """
     return accuracy.key in product_keys(case).values()
 
 
@@ -44,6 +49,9 @@ def discretisation(run_folder: Path, case: Case) -> Discretisation:
     Args:
         run_folder: Run folder; the study is searched next to it.
         case: Case of the run.
+
+    Returns:
+        Relative error of each metric by name, its origin in words, and why others are unknown; empty without a study.
     """
     accuracy = read_case_accuracy(run_folder, case)
     if accuracy is None:
@@ -60,7 +68,7 @@ def discretisation(run_folder: Path, case: Case) -> Discretisation:
 
 
 def grid_convergence_index(error: Error) -> float:
-    """Return an error times a safety factor: 1.25 if it is against a Richardson extrapolation, else 3."""
+    """Return a relative error times a safety factor: 1.25 if it is against a Richardson extrapolation, else 3."""
     return error.value * (SAFETY_WITHOUT_ORDER if error.order is None else SAFETY)
 
 

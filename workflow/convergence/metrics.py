@@ -14,10 +14,13 @@ def read_metric_errors(
     """Read errors against an exact solution; where a run has none, the value itself, to be compared with finer runs.
 
     Args:
-        exact: Exact solution, for readers.
-        errors: Names of metrics as keys; the name of a value lacks the suffix ``_error``.
+        exact: Name of the exact solution, for readers.
+        errors: Name of a metric ending in ``_error`` -> its explanation; only the names are used.
         stage: Stage whose record has the metrics.
-        run_folder: Folder of the run.
+        run_folder: Folder of the run, from which the record is read.
+
+    Returns:
+        Quantity by name of the error; empty if the stage has no record.
     """
     record = read_record(run_folder / stage)
     metrics = {} if record is None else record["metrics"]

@@ -23,12 +23,12 @@ PAGE, PICTURE, TEXT = "accuracy.html", "accuracy.png", "accuracy.md"
 
 
 def write_pages(folder: Path, accuracy: Accuracy, remarks: tuple[str, ...] = ()) -> None:
-    """Write the page, the plot and the Markdown tables of a convergence study.
+    """Write page (HTML), plot (PNG) and tables (Markdown) of a convergence study.
 
     Args:
         folder: Folder to write to.
         accuracy: Convergence study.
-        remarks: Further notes.
+        remarks: Further notes, one sentence each.
     """
     write_page(folder / PAGE, "accuracy.html.j2", {"version": __version__, "accuracy": section(accuracy, remarks)})
     save_picture(accuracy, folder / PICTURE)
@@ -36,11 +36,11 @@ def write_pages(folder: Path, accuracy: Accuracy, remarks: tuple[str, ...] = ())
 
 
 def section(accuracy: Accuracy, remarks: tuple[str, ...] = (), *, elsewhere: bool = False, stale: bool = False) -> dict:
-    """Return the context of the template of a study's section.
+    """Return the values of the template's variables for a study's section: tables, charts, texts and flags by name.
 
     Args:
         accuracy: Convergence study.
-        remarks: Further notes.
+        remarks: Further notes, one sentence each.
         elsewhere: Whether the study belongs to another case than the page.
         stale: Whether the case has changed since the study was run.
     """
@@ -110,7 +110,11 @@ def _markdown(table: dict) -> str:
 
 
 def charts(accuracy: Accuracy) -> list[Chart]:
-    """Return charts of the judged error over wall time and over core-seconds, with run names as labels."""
+    """Return charts of the judged error over wall time and over core-seconds, with run names as labels.
+
+    Returns:
+        Interactive charts for the report page.
+    """
     level = Axis("error [%]", log=True)
     return [
         Chart(Axis(label, log=True), level, _series(accuracy, cost))
@@ -140,7 +144,12 @@ def _series(accuracy: Accuracy, cost: str) -> list[Series]:
 
 
 def save_picture(accuracy: Accuracy, path: Path) -> None:
-    """Write the Pareto plot as PNG."""
+    """Write the Pareto plot of error over cost as PNG.
+
+    Args:
+        accuracy: Convergence study.
+        path: File to write.
+    """
     from reflowshock.workflow.report.drawing import pyplot
 
     drawing = figure(accuracy)

@@ -14,8 +14,8 @@ def front(costs: Sequence[float], errors: Sequence[float]) -> list[int]:
     """Return the indices of the runs on the Pareto front, the cheapest first.
 
     Args:
-        costs: Cost of each run.
-        errors: Error of each run.
+        costs: Cost of each run, in any unit.
+        errors: Error of each run, in the same order.
     """
     smallest_error, indices = float("inf"), []
     for index in sorted(range(len(costs)), key=lambda k: (costs[k], errors[k])):
@@ -31,7 +31,7 @@ SMALLEST_ERROR = 5e-5  # smallest error that is written as a number
 
 
 def all_measurements(accuracy: Accuracy) -> list[Measurement]:
-    """Return all measurements, including the recommended run."""
+    """Return the measurements of all runs of a study, including the recommended run."""
     recommended = accuracy.recommended.found if accuracy.recommended else None
     if recommended is None or recommended.run in {measurement.run for measurement in accuracy.measurements}:
         return list(accuracy.measurements)
@@ -39,7 +39,7 @@ def all_measurements(accuracy: Accuracy) -> list[Measurement]:
 
 
 def compared(accuracy: Accuracy) -> list[Measurement]:
-    """Return the measurements with a total error of the judged quantity."""
+    """Return the measurements of the judged quantity's total error; failed, reference and partial runs are left out."""
     return [m for m in all_measurements(accuracy) if accuracy.judged in m.errors and not m.against]
 
 
@@ -51,7 +51,14 @@ def on_front(accuracy: Accuracy) -> set[str]:
 
 
 def runs(accuracy: Accuracy) -> dict:
-    """Return the table of runs: setting, errors, costs, and a remark on an unusual reference or a failure."""
+    """Return the table of runs: setting, errors, costs, and a remark on an unusual reference or a failure.
+
+    Args:
+        accuracy: Convergence study.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text); columns without any text are left out.
+    """
     best, usual = on_front(accuracy), usual_reference(accuracy)
     head = ["setting", *(short(name) for name in accuracy.errors), "wall s", "core s", ""]
     rows = []
@@ -80,7 +87,7 @@ def remarks(accuracy: Accuracy) -> list[str]:
 
 
 def short(quantity: str) -> str:
-    """Return the short name of a quantity for the head of a column."""
+    """Return the name of a quantity for the head of a column: without ``_error`` and underscores."""
     return quantity.removesuffix("_error").replace("_", " ")
 
 
@@ -114,7 +121,14 @@ def legend(accuracy: Accuracy) -> str:
 
 
 def orders(accuracy: Accuracy) -> dict:
-    """Return the table of observed and theoretical orders, and of the growth of the cost."""
+    """Return the table of observed and theoretical orders, and of the growth of the cost.
+
+    Args:
+        accuracy: Convergence study with its fits.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per parameter and quantity.
+    """
     rows = [
         [
             parameter,
@@ -138,7 +152,15 @@ def _growth(fit: Fit) -> str:
 
 
 def prediction(accuracy: Accuracy) -> dict | None:
-    """Return the table of predicted and measured error and cost of the recommendation; None if it was not run."""
+    """Return the table of predicted and measured error and cost of the recommendation; None if it was not run.
+
+    Args:
+        accuracy: Convergence study.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text): error and core-seconds; None if the
+        recommendation was not run.
+    """
     chosen = accuracy.recommended
     if chosen is None or chosen.found is None or accuracy.judged not in chosen.found.errors:
         return None
@@ -156,12 +178,16 @@ def prediction(accuracy: Accuracy) -> dict | None:
 
 
 def change(measured: float, predicted: float) -> str:
-    """Write the relative difference between a measured and a predicted value."""
+    """Write the relative difference of a measured from a predicted value in per cent with its sign, such as "+12 %"."""
     return f"{100.0 * (measured / predicted - 1.0):+.0f} %"
 
 
 def as_lines(settings: Mapping[str, str]) -> list[str]:
-    """Return settings as lines of a case file, grouped by table."""
+    """Return settings as lines of a case file, grouped by table.
+
+    Args:
+        settings: Dotted key -> value as text, as for ``--set``.
+    """
     lines: list[str] = []
     table = None
     for key, text in sorted(settings.items()):
@@ -174,5 +200,9 @@ def as_lines(settings: Mapping[str, str]) -> list[str]:
 
 
 def as_options(settings: Mapping[str, str]) -> str:
-    """Return settings as options of the command line."""
+    """Return settings as options ``--set key=value`` of the command line, quoted for a shell.
+
+    Args:
+        settings: Dotted key -> value as text.
+    """
     return " ".join(f"--set {shlex.quote(f'{key}={text}')}" for key, text in settings.items())

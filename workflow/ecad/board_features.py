@@ -35,7 +35,16 @@ class Mass:
 
 
 def board_table(board: Layout, thickness: float, holes: list[Hole]) -> dict:
-    """Return the table ``[board]`` of a case file in SI units, without symmetry."""
+    """Return the table ``[board]`` of a case file in SI units, without symmetry.
+
+    Args:
+        board: Board in the frame of the package.
+        thickness: Thickness of the board [m].
+        holes: Mounting holes.
+
+    Returns:
+        Keys of the table: ``length``, ``width``, ``thickness``, ``centre``, ``symmetry`` ("full") and ``holes``.
+    """
     (x0, y0), (x1, y1) = board.low, board.high
     centre = tuple(0.0 if abs(value) < CENTRE_TOLERANCE else value for value in (0.5 * (x0 + x1), 0.5 * (y0 + y1)))
     return {
@@ -96,6 +105,9 @@ def lumped_masses(board: Layout, package: str, thickness: float) -> tuple[list[M
         board: Board in the frame of the package.
         package: Reference of the package.
         thickness: Thickness of the board [m].
+
+    Returns:
+        Masses with names that are valid in TOML, and a list of at most one note.
     """
     masses: list[Mass] = []
     left_out = []

@@ -97,12 +97,16 @@ class Layout:
 
 
 def in_mm(length: float, digits: int = 10) -> str:
-    """Format a length [m] in millimetres."""
+    """Format a length [m] in millimetres, with at most ``digits`` significant digits and the unit."""
     return from_si(length, "mm", digits)
 
 
 def check_file(path: Path) -> Path:
-    """Return the path of an existing file of acceptable size, or raise ``EcadError``."""
+    """Return the path of an existing file of at most ``MAX_FILE_SIZE`` bytes.
+
+    Raises:
+        EcadError: The file does not exist or is too large.
+    """
     if not path.is_file():
         raise EcadError(path, "no such file")
     if path.stat().st_size > MAX_FILE_SIZE:
@@ -111,7 +115,11 @@ def check_file(path: Path) -> Path:
 
 
 def check_layout(layout: Layout) -> Layout:
-    """Return a layout with positive dimensions unchanged, or raise ``EcadError``."""
+    """Return a layout unchanged if its dimensions are plausible.
+
+    Raises:
+        EcadError: A dimension is not positive, or the board is too small.
+    """
     sides = [high - low for low, high in zip(layout.low, layout.high, strict=True)]
     if min(sides) < MIN_SIDE:
         raise EcadError(
@@ -129,7 +137,11 @@ def check_layout(layout: Layout) -> Layout:
 
 
 def read_text(path: Path) -> str:
-    """Return the text of a UTF-8 file, or raise ``EcadError``."""
+    """Return the text of a UTF-8 file.
+
+    Raises:
+        EcadError: The file does not exist, is too large, or is not UTF-8.
+    """
     try:
         return check_file(path).read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
@@ -158,7 +170,7 @@ def checked_number(path: Path, what: str, text: object, largest: float = 10.0) -
 
 
 def box_around(points: list[Point]) -> tuple[Point, Point]:
-    """Return the lower left and upper right corners of the bounding box of points."""
+    """Return the lower left and upper right corners (x, y) of the bounding box of points, in their unit."""
     xs, ys = zip(*points, strict=True)
     return (min(xs), min(ys)), (max(xs), max(ys))
 
@@ -180,7 +192,15 @@ def round_diameter(shape: str, width: float, height: float) -> float:
 
 
 def arc_about(centre: Point, start: Point, end: Point, clockwise: bool, pieces: int = 64) -> list[Point]:
-    """Return points along an arc about a centre, a full circle if start and end coincide."""
+    """Return points along an arc about a centre.
+
+    Args:
+        centre: Centre (x, y).
+        start: First point of the arc.
+        end: Last point of the arc; a full circle if it coincides with the first.
+        clockwise: Direction of the arc.
+        pieces: Number of segments of the arc; one more point is returned.
+    """
     (x, y), radius = centre, math.dist(centre, start)
     first, last = (math.atan2(b - y, a - x) for a, b in (start, end))
     sweep = (first - last if clockwise else last - first) % math.tau or math.tau
@@ -189,7 +209,12 @@ def arc_about(centre: Point, start: Point, end: Point, clockwise: bool, pieces: 
 
 
 def outline_notes(points: list[Point], straight: bool) -> tuple[str, ...]:
-    """Return a note if an outline is not a rectangle along the axes, else nothing."""
+    """Return a tuple with one note for the user if an outline is not a rectangle along the axes, else an empty one.
+
+    Args:
+        points: Corners (x, y) of the outline [m].
+        straight: Whether the outline has no arcs.
+    """
     (x0, y0), (x1, y1) = box_around(points)
     margin = 1e-6 + 1e-6 * max(x1 - x0, y1 - y0)
     on_corners = all(
@@ -199,7 +224,12 @@ def outline_notes(points: list[Point], straight: bool) -> tuple[str, ...]:
 
 
 def components_by_reference(components: list[Component], path: Path) -> dict[str, Component]:
-    """Return components by reference; a number is appended to repeated or empty references."""
+    """Return components by reference; a number is appended to repeated or empty references.
+
+    Args:
+        components: Components in the order of the file.
+        path: File of the board, for messages.
+    """
     if sum(len(component.pads) for component in components) > MAX_ITEMS:
         raise EcadError(path, f"the board has more than {MAX_ITEMS} pads")
     by_reference: dict[str, Component] = {}

@@ -46,7 +46,8 @@ def case_from_answers(answers: dict[str, Any]) -> str:
     """Return the text of a case file from converted answers.
 
     Args:
-        answers: Results of ``Question.read`` by ``Question.key``.
+        answers: Results of ``Question.read`` by ``Question.key``: ``array`` ((rows, columns), pitch [m]), ``ball`` [m]
+            or None, ``board`` (length, width, thickness [m]), ``drop`` (service condition), ``name``.
     """
     (rows, columns), pitch = answers["array"]
     ball, (length, width, thickness) = answers["ball"] or BALL_RATIO * pitch, answers["board"]

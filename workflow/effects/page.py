@@ -23,7 +23,7 @@ FIELDS = (
 
 
 def show_registry(console: Console) -> None:
-    """Print every effect of the program."""
+    """Print the tables of all effects of the program, by stage: what they add, influence, switch, implementation."""
     for stage in dict.fromkeys(effect.stage for effect in registry().values()):
         table = new_table(f"\nEffects of the {stage}", "effect", "", "description")
         for effect in registry().values():
@@ -50,7 +50,13 @@ def _add(table: Table, effect: Effect) -> None:
 
 
 def effects_table(case: Case, effects: Mapping[str, Any], of_what: str) -> Table:
-    """Return the effects of a case: on or off, expected influence, share of the cost, why."""
+    """Return the table for the terminal of a case's effects: on or off, expected influence, share of the cost, why.
+
+    Args:
+        case: Case of the effects.
+        effects: Name of an effect -> its decision: ``on``, ``why`` and, if predicted, ``influence``.
+        of_what: What the effects act on, for the title.
+    """
     table = new_table(f"\nEffects of the {of_what}", *HEAD)
     for name, acts, influence, cost, why in rows(case, effects):
         table.add_row(name, style_text("[green]on[/]" if acts else "[dim]off[/]"), influence, cost, why)

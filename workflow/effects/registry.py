@@ -10,7 +10,7 @@ SHOCK_SUFFIX = "_in_the_shock"
 
 @cache
 def registry() -> dict[str, Effect]:
-    """Return the effects of reflow, heating, drop and flow by name."""
+    """Return the effects of reflow, heating, drop and flow by name; the order is that of these kinds."""
     from reflowshock.workflow.flows.registry import FLOWS
     from reflowshock.workflow.kinds import BOARD_DROP
 

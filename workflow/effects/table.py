@@ -23,7 +23,7 @@ MEASURED = Path(__file__).with_name("costs.json")  # written by benchmarks/effec
 
 @cache
 def read_measured_ratios() -> dict[str, float]:
-    """Return measured ratios of the processor time per step with and without an effect, by effect."""
+    """Return, by effect name, the measured processor time per step with the effect over the one without it."""
     return {name: item["ratio"] for name, item in json.loads(MEASURED.read_text(encoding="utf-8"))["effects"].items()}
 
 
@@ -31,6 +31,13 @@ def cost_shares(case: Case, effects: Mapping[str, Any]) -> dict[str, float]:
     """Return the share of each effect in the predicted cost; for inactive effects, the share that it would add.
 
     Shares are negative if the effect saves time. Effects without predicted or measured cost are omitted.
+
+    Args:
+        case: Case, whose cost is predicted.
+        effects: Name of an effect -> its decision: ``on``, ``why`` and, if predicted, ``influence``.
+
+    Returns:
+        Name of an effect -> share of the predicted wall time.
     """
     try:
         seconds = kind_of(case).forecast(case).seconds
@@ -70,7 +77,15 @@ CAPTION = (
 
 
 def rows(case: Case, effects: Mapping[str, Any]) -> Iterator[tuple[str, bool, str, str, str]]:
-    """Yield name, state (True: on), influence, cost and reason of each effect of a case."""
+    """Yield one row per effect of a case, as text except for the state.
+
+    Args:
+        case: Case of the effects.
+        effects: Name of an effect -> its decision: ``on``, ``why`` and, if predicted, ``influence``.
+
+    Yields:
+        Name, whether it is on, influence, cost and reason; "–" without a prediction.
+    """
     shares = cost_shares(case, effects)
     for name, decision in effects.items():
         influence, share = decision.get("influence"), shares.get(name)
@@ -94,7 +109,15 @@ def per_cent(share: float) -> str:
 
 
 def report_table(case: Case, effects: Mapping[str, Any]) -> dict:
-    """Return the report table of simulated effects: influence, predicted cost and reason."""
+    """Return the report table of simulated effects: influence, predicted cost and reason.
+
+    Args:
+        case: Case of the effects.
+        effects: Name of an effect -> its decision: ``on``, ``why`` and, if predicted, ``influence``.
+
+    Returns:
+        Table with ``head``, ``rows`` (lists of text), ``prose`` and ``caption``.
+    """
     table_rows = [
         [name, "on" if acts else "off", influence, cost, why]
         for name, acts, influence, cost, why in rows(case, effects)

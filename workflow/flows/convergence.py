@@ -12,7 +12,15 @@ ROUNDING = 1e-9
 
 
 def flow_study(flow: FlowKind, case: FlowCase) -> ConvergenceStudy:
-    """Return the study of a flow: the particles across the scene, and at the coarsest of them others."""
+    """Return the convergence study of a flow: number of particles across the scene, and other numerical parameters.
+
+    Args:
+        flow: Kind of flow.
+        case: Case of this kind; further parameters are varied with the coarsest number of particles.
+
+    Returns:
+        Varied parameters, further runs, and the function that measures their errors.
+    """
     numerics, measures = f"{case.kind}.numerics", flow.measures(case.scene)
 
     def run_at(value: float) -> StudyRun:

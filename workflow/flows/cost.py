@@ -67,6 +67,9 @@ def plane_costs(scene: FlowScene, steps: int, shear_factor: float) -> dict[str, 
         scene: Scene with its particles.
         steps: Number of time steps.
         shear_factor: `SHEAR_COST` if the viscosity depends on the shear rate, else 1.
+
+    Returns:
+        Device -> its predicted cost.
     """
     factor = scene.numerics.relative_cost
     each = SECONDS_PER_PARTICLE * shear_factor * factor
@@ -78,7 +81,11 @@ def plane_costs(scene: FlowScene, steps: int, shear_factor: float) -> dict[str, 
 
 
 def surface_costs(scene: Sized, steps: int, shear_factor: float) -> dict[str, Cost]:
-    """Return the cost of a flow in space with a triangulated surface; arguments as in `plane_costs`."""
+    """Return the cost of a flow in space with a triangulated surface; arguments as in `plane_costs`.
+
+    Returns:
+        Device -> its predicted cost.
+    """
     each = SECONDS_PER_PARTICLE_IN_SPACE * shear_factor
     return {
         "cpu": Cost(steps, SECONDS_PER_STEP_IN_SPACE, each * scene.particles),

@@ -145,7 +145,15 @@ def _limits(scene: Droplet) -> dict[str, float]:
 
 
 def droplet_curves(drop: Droplet, result: "FlowResult") -> "list[Chart]":
-    """Return charts of the shape with the cap at rest, of the pressure or the speed, and of the energies."""
+    """Return charts of the shape with the cap at rest, of the pressure or the speed, and of the energies.
+
+    Args:
+        drop: Parameters of the flow, the scene of the case.
+        result: Result of the flow: snapshots, history (name -> samples, time in s) and metrics.
+
+    Returns:
+        Interactive charts for the report page.
+    """
     from reflowshock.workflow.report.charts import Axis, Chart, Series
     from reflowshock.workflow.report.colours import ORANGE, RED
 
@@ -198,7 +206,11 @@ def _reference_widths(drop: Droplet, ends: Floats) -> "list[Series]":
 
 
 def plan_rows(drop: Droplet) -> list[Row]:
-    """Return the dimensionless numbers of a droplet and its state at rest."""
+    """Return the dimensionless numbers of a droplet and its state at rest, as rows of ``plan``.
+
+    Returns:
+        Quantity, value and remark of each row, as text.
+    """
     rows = [("Ohnesorge number", f"{drop.ohnesorge:.3g}", "viscosity / surface tension")]
     if drop.impact_speed:
         rows.append(("Weber number", f"{drop.weber_number:.3g}", from_si(drop.impact_speed, "m/s", digits=3)))

@@ -46,7 +46,12 @@ class Measures:
 
 
 def metric_text(name: str, metric: dict) -> str:
-    """Write a metric: relative errors, drifts and rises in per cent, others with their unit."""
+    """Write a metric: relative errors, drifts and rises in per cent, others with their unit.
+
+    Args:
+        name: Name of the metric, which decides on the format.
+        metric: Record with ``value`` (SI) and ``unit``.
+    """
     if metric["unit"] == "" and ("error" in name or name.endswith(("_drift", "_rise"))):
         return percent(metric["value"])
     return quantity(metric)

@@ -44,7 +44,7 @@ class FlowForecast:
 
 
 def forecast_flow(flow: FlowKind, case: FlowCase) -> FlowForecast:
-    """Predict effects, size, time step and cost of a flow."""
+    """Predict effects, size, time step and cost of a flow, without running it."""
     scene: FlowScene = case.scene
     effects = decide_flow(scene)
     step = scene.expected_time_step(effects["flow_viscosity"]["on"])
@@ -56,7 +56,11 @@ def forecast_flow(flow: FlowKind, case: FlowCase) -> FlowForecast:
 
 
 def flow_size(flow: FlowKind, case: FlowCase) -> Size:
-    """Predict wall times and memory of the stages of a case."""
+    """Predict wall times and memory of the stages of a case.
+
+    Returns:
+        Seconds by stage, number of joints (1), and memory [B].
+    """
     forecast = forecast_flow(flow, case)
     return Size(forecast.seconds, 1, BYTES_OF_PARTICLE * forecast.particles)
 

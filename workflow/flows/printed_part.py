@@ -52,7 +52,14 @@ def add_part(products: Path, context: dict) -> None:
 
 
 def part_scene(stl: Path) -> Scene:
-    """Return the surface of the part, coloured by height; the STL file is in millimetres."""
+    """Return the 3D scene of the part's surface, coloured by height.
+
+    Args:
+        stl: STL file of the surface, in millimetres.
+
+    Returns:
+        Interactive 3D scene for the report page.
+    """
     mesh = meshio.read(stl)
     points, vertex = np.unique(1e-3 * mesh.points, axis=0, return_inverse=True)
     faces = vertex.reshape(-1)[mesh.cells[0].data]
@@ -63,7 +70,14 @@ def part_scene(stl: Path) -> Scene:
 
 
 def layer_table(file: Path) -> dict:
-    """Return the table of layers; each row describes the part after that layer."""
+    """Return the table of layers; each row describes the part after that layer.
+
+    Args:
+        file: CSV file ``layers.csv`` of the stage.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text).
+    """
     head = file.read_text(encoding="utf-8").splitlines()[0].split(",")
     columns = [head.index(name) for name in COLUMNS]
     rows = np.loadtxt(file, delimiter=",", skiprows=1, ndmin=2)[:, columns]

@@ -63,15 +63,15 @@ def viscosity_problems(kind: str, scene: FlowScene) -> list[Problem]:
 
 
 def degrees(angle: float) -> str:
-    """Write an angle [rad] in degrees."""
+    """Format an angle [rad] in degrees with three digits and the unit."""
     return from_si(angle, "deg", digits=3)
 
 
 def metres(length: float) -> str:
-    """Write a length [m]."""
+    """Format a length [m] in metres with three digits and the unit."""
     return from_si(length, "m", digits=3)
 
 
 def micrometres(length: float) -> str:
-    """Write a length [m] in micrometres."""
+    """Format a length [m] in micrometres with three digits and the unit."""
     return from_si(length, "um", digits=3)

@@ -41,7 +41,15 @@ def add_flow(flow: FlowKind, run_folder: Path, case: FlowCase, context: dict, su
 
 
 def flow_scene(result: "FlowResult", scene: FlowScene) -> Scene:
-    """Return the particles at the stored times, coloured by speed and pressure, and the walls."""
+    """Return the particles at the stored times, coloured by speed and pressure, and the walls.
+
+    Args:
+        result: Products of the stage ``particles``.
+        scene: Parameters of the flow.
+
+    Returns:
+        Interactive 3D scene for the report page, one frame per stored time.
+    """
     pictures = result.pictures
     frames = [short(picture.time) if scene.dimension == 3 else f"{1e3 * picture.time:.4g} ms" for picture in pictures]
     speeds = [np.sqrt((picture.velocity**2).sum(axis=1)) for picture in pictures]

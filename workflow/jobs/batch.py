@@ -99,12 +99,18 @@ class _Task:
 
 
 def job_name(point: Point, stage: str) -> str:
-    """Return the name of the job that makes a product."""
+    """Return the name of the job that makes the product of a stage: ``<stage>-<key>``."""
     return f"{stage}-{point.digests[stage]}"
 
 
 def list_missing(store: Store, points: Sequence[Point], until: str) -> list[Job]:
-    """List the missing products of points, up to one stage, without duplicates."""
+    """List the jobs for missing, stale or damaged products of points, without duplicates, in the order of the stages.
+
+    Args:
+        store: Store of the products, which is examined.
+        points: Points of the run or study.
+        until: Last stage to make.
+    """
     jobs: dict[str, Job] = {}
     for point in points:
         before: list[str] = []
@@ -118,7 +124,11 @@ def list_missing(store: Store, points: Sequence[Point], until: str) -> list[Job]
 
 
 def show_products(store: Store, point: Point) -> list[str]:
-    """Link all intact, current products into the run folder of a point; return the restored files."""
+    """Link all intact, current products into the run folder of a point.
+
+    Returns:
+        Names of files of the run folder that were missing or modified and have been restored.
+    """
     states = examine(store, point)
     return show(store, point, [name for name, state in states.items() if not (state.stale or state.because_of)])
 
@@ -143,7 +153,7 @@ def run_points(
         lock: File descriptor that ``locked`` yields for the folder of the store.
 
     Returns:
-        Reason of failure by key of each incomplete point.
+        Product key of each incomplete point -> reason of its failure; empty if all are complete.
 
     Raises:
         RunFolderBusy: Jobs of an earlier command are still running in the store.
@@ -166,13 +176,28 @@ def run_points(
 
 
 def failure_message(store: Store, point: Point, until: str) -> str:
-    """Return the first missing stage of an incomplete point and its message; empty if the point is complete."""
+    """Return the first missing stage of an incomplete point and its message; empty if the point is complete.
+
+    Args:
+        store: Store of the products.
+        point: Point to examine.
+        until: Last stage that was requested.
+    """
     failure = failure_of(store, point, until)
     return f"stage {failure[0]}: {failure[1]}" if failure else ""
 
 
 def failure_of(store: Store, point: Point, until: str) -> tuple[str, str] | None:
-    """Return the first missing stage of a point and the reason, or None if all stages exist."""
+    """Return the first missing stage of a point and the reason, or None if all stages exist.
+
+    Args:
+        store: Store of the products.
+        point: Point to examine.
+        until: Last stage that was requested.
+
+    Returns:
+        Name of the stage and reason, or None if the products of all stages up to the last one exist.
+    """
     states = examine(store, point)
     stale_stages = [stage.name for stage in point.case.pipeline.upstream(until) if states[stage.name].stale]
     if not stale_stages:
@@ -220,7 +245,10 @@ def _run(store: Store, jobs: Sequence[Job], machine: Machine, lock: int) -> bool
 
 
 def write_jobs(store: Store, jobs: Sequence[Job], machine: Machine) -> None:
-    """Write the jobs for the Snakefile; later stages get priority, so that points complete one by one."""
+    """Write ``batch/jobs.json`` of a store, the jobs that the Snakefile runs.
+
+    Later stages get priority, so that points complete one by one.
+    """
     tasks = {}
     resources = {job.point.key: machine.executor.jobs(job.point.case) for job in jobs}
     for job in jobs:

@@ -19,8 +19,12 @@ def prepare_run(config: Mapping[str, Any], cores: int) -> tuple[Store, Point]:
     """Read a case and write the jobs for the missing products of its run.
 
     Args:
-        config: ``case`` and, optionally, ``set``, ``out``, ``oversubscribe``.
+        config: Configuration of Snakemake: ``case`` (path) and, optionally, ``set`` (list of "key=value"), ``out`` (run
+            folder), ``oversubscribe`` (0 or 1).
         cores: Number of cores for Snakemake.
+
+    Returns:
+        Store of the run folder, and the point to make; the folder stays locked until the process ends.
 
     Raises:
         CaseError: The case or the run folder is invalid.

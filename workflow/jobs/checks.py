@@ -55,7 +55,7 @@ def partitions() -> list[Partition]:
 
 
 def jobs_in(folder: Path) -> list[str]:
-    """Return the queued or running jobs of this user whose working directory is a folder.
+    """Return the numbers of this user's queued or running Slurm jobs whose working directory is a folder.
 
     Raises:
         NoAnswer: Slurm cannot be reached.
@@ -65,7 +65,11 @@ def jobs_in(folder: Path) -> list[str]:
 
 
 def cancel(jobs: list[str]) -> None:
-    """Cancel jobs that have not ended."""
+    """Cancel Slurm jobs that have not ended.
+
+    Args:
+        jobs: Numbers of the jobs; empty is allowed.
+    """
     if jobs:
         subprocess.run(["scancel", *jobs], capture_output=True, timeout=WAIT, check=False)
 

@@ -77,7 +77,7 @@ def snakemake(
 
 
 def last_lines(home: Path) -> str:
-    """Return the last lines of Snakemake's output."""
+    """Return the last lines of Snakemake's log in the folder of a store; empty without a log."""
     path = home / SNAKEMAKE_LOG
     lines = path.read_text(encoding="utf-8", errors="replace").strip().splitlines() if path.is_file() else []
     return "\n".join(lines[-LAST_LINES:])

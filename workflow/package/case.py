@@ -94,7 +94,7 @@ BOARD_DROP = package_pipeline(heated=False, dropped=True)
 
 
 def joint_geometries(pads: "Sequence[PadSite]") -> "dict[str, JointGeometry]":
-    """Return the geometry of each joint of a pad table, by name."""
+    """Return the geometry (gap, radii, offset, tilt) of each joint of a pad table, by joint name."""
     from reflowshock.particles.core.geometry import JointGeometry
 
     return {

@@ -24,6 +24,10 @@ Records = Mapping[str, Mapping[str, Any]]
 def of_geometry(joints: int, elements: Mapping[str, int]) -> Findings:
     """Return the number of joints, and the number of hexahedra in each part, as metrics.
 
+    Args:
+        joints: Number of joints.
+        elements: Name of a part -> number of its hexahedra.
+
     Returns:
         Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
     """
@@ -39,7 +43,7 @@ def of_reflow(joints: Records, effects: Mapping[str, Any]) -> Findings:
 
     Args:
         joints: Record of each joint, by name, from ``joints.json``.
-        effects: Decision on each effect of the reflow.
+        effects: Name of an effect -> its decision: ``on``, ``why`` and, if predicted, ``influence``.
 
     Returns:
         Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
@@ -140,7 +144,8 @@ def of_solder_mesh(qualities: Mapping[str, Records], effects: Mapping[str, Any])
 
     Args:
         qualities: Quality by kind of mesh (prefix of the metrics), then by joint.
-        effects: Decision on each effect that adds joint meshes.
+        effects: Name of an effect -> its decision: ``on``, ``why`` and, if predicted, ``influence``, for effects that
+            add joint meshes.
 
     Returns:
         Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
@@ -167,7 +172,8 @@ def of_shock(results: Mapping[str, dict], folder: Path, thickness: float) -> Fin
     """Return metrics and checks of the shock, and of two-scale against DNS if both were run.
 
     Args:
-        results: ``result.json`` of each mode, the main mode first.
+        results: Mode -> content of its ``result.json`` (``model``, ``metrics``, ``health``, ``timings``, ``coupling``),
+            the main mode first.
         folder: Folder of the shock, with a folder for each mode.
         thickness: Thickness of the board [m]; small kinematics need a much smaller deflection.
 
@@ -192,7 +198,11 @@ def of_shock(results: Mapping[str, dict], folder: Path, thickness: float) -> Fin
 
 
 def fine_joints_of(result: Mapping[str, Any]) -> list[str] | None:
-    """Return the fine joints of a run with coarse joints; None if all are fine."""
+    """Return the names of the fine joints of a run with coarse joints; None if all are fine.
+
+    Args:
+        result: Content of ``result.json`` of the run.
+    """
     fine = result.get("coupling", {}).get("fine_joints", "all")
     return None if isinstance(fine, str) else list(fine)
 
@@ -213,8 +223,8 @@ def ideal_ratio(coupling: Mapping[str, Any], dns: Mapping[str, Any]) -> float | 
     """Return the ideal time ratio two-scale / DNS: equal cost of all element updates, no overhead.
 
     Args:
-        coupling: Coupling record of the two-scale run; without levels the result is None.
-        dns: Model record of the DNS, which takes the smallest step everywhere.
+        coupling: Entry ``coupling`` of the two-scale ``result.json``; without ``levels`` the result is None.
+        dns: Entry ``model`` of the DNS, which takes the smallest ``step`` [s] in all ``elements`` (number by role).
     """
     rates = [record["elements"] / record["step"] for record in coupling.get("levels", ())]
     return sum(rates) * dns["step"] / sum(dns["elements"].values()) if rates else None

@@ -17,7 +17,12 @@ KEY = "package.surfaces"
 
 
 def located(table: dict, folder: Path) -> dict:
-    """Resolve, in place, the surface files of a case table relative to the folder of its file; return the table."""
+    """Resolve, in place, the surface files of a case's tables relative to the folder of its file; return the tables.
+
+    Args:
+        table: All tables of the case file, nested as in TOML; without surfaces nothing changes.
+        folder: Folder of the case file.
+    """
     package = table.get("package")
     surfaces = package.get("surfaces") if isinstance(package, dict) else None
     if isinstance(surfaces, dict):
@@ -27,7 +32,7 @@ def located(table: dict, folder: Path) -> dict:
 
 
 def files(package: "Package") -> dict[str, Path]:
-    """Return the surface files by dotted key."""
+    """Return the user's surface files by dotted key, ``package.surfaces.<joint>``."""
     return {f"{KEY}.{name}": Path(path) for name, path in package.surfaces.items()}
 
 
@@ -75,7 +80,8 @@ def given_records(package: "Package", pads: "Iterable[PadSite]", reflowed: Conta
         reflowed: Joints that already have a record.
 
     Returns:
-        Record of each joint: ``given`` (file), ``place``, ``verdict`` "given", ``metrics``.
+        Record of each joint that has a given surface and no record yet: ``given`` (file), ``place`` (position of the
+        package's pad relative to the board's), ``verdict`` "given", ``metrics``.
 
     Raises:
         SurfaceError: A surface does not fit its joint.

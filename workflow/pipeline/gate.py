@@ -42,6 +42,10 @@ class Leave:
 def problems_of(case: Case, leave: Leave) -> list[Problem]:
     """Return the problems of a case whose individual values are valid; the cheapest checks run first.
 
+    Args:
+        case: Case with values that are valid one by one.
+        leave: Permissions of the user: more ranks than cores, implausible values.
+
     Returns:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
     """
@@ -120,7 +124,7 @@ def machine_memory() -> float:
 
 
 def ask_if_long(name: str, seconds: float, yes: bool, console: Console) -> bool:
-    """Ask the user to confirm a long run.
+    """Ask the user to confirm a run that is predicted to take more than an hour; shorter ones may start at once.
 
     Args:
         name: Name of the run.

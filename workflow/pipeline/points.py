@@ -59,12 +59,20 @@ def read_possible_points(
 
 
 def overrides(settings: Mapping[str, str]) -> list[str]:
-    """Return settings in the form of ``--set`` arguments."""
+    """Return settings as ``--set`` arguments, "key=value" each.
+
+    Args:
+        settings: Dotted key -> value as text.
+    """
     return [f"{key}={value}" for key, value in settings.items()]
 
 
 def settings_text(settings: Mapping[str, str]) -> str:
-    """Return settings as readable text."""
+    """Return settings as readable text, "key = value" separated by commas.
+
+    Args:
+        settings: Dotted key -> value as text; empty for the case as it is.
+    """
     return ", ".join(f"{key} = {value}" for key, value in settings.items()) or "the case as it is"
 
 

@@ -95,7 +95,16 @@ def _setting(override: str, problems: list[Problem]) -> tuple[str, object]:
 
 
 def set_value(table: dict, path: list[str], value: object) -> bool:
-    """Set a value in nested tables; return False if the path leads through a value that is not a table."""
+    """Set a value in nested tables, in place, creating missing tables.
+
+    Args:
+        table: Outermost table.
+        path: Names of the tables and of the key, the outermost first.
+        value: Value to set.
+
+    Returns:
+        Whether the value was set: False if the path leads through a value that is not a table.
+    """
     for name in path[:-1]:
         table = table.setdefault(name, {})
         if not isinstance(table, dict):

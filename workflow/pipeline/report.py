@@ -24,12 +24,12 @@ def write_report(run_folder: Path, case: Case, folder: Path) -> dict:
     """Write ``report.html`` and ``summary.json``.
 
     Args:
-        run_folder: Folder of the run; stages without a product are omitted from the page.
+        run_folder: Run folder, which is read; stages without a product are omitted from the page.
         case: The resolved case.
-        folder: Output folder.
+        folder: Folder into which both files are written.
 
     Returns:
-        The summary.
+        Content of ``summary.json``, see ``collect_summary``.
     """
     summary, errors = _concluded(run_folder, case)
     write_summary(folder, summary)
@@ -38,7 +38,12 @@ def write_report(run_folder: Path, case: Case, folder: Path) -> dict:
 
 
 def moving_scene(run_folder: Path, case: Case) -> Scene | None:
-    """Return the first animated scene of a report: the drop, otherwise the solder; None without animation."""
+    """Return the first animated scene of a report: the drop, otherwise the solder; None without animation.
+
+    Args:
+        run_folder: Run folder, whose products are read; no page is written.
+        case: The resolved case.
+    """
     scenes = _context(run_folder, case, *_concluded(run_folder, case))["scenes"]
     candidates = (scenes[name] for name in ("view", "body") if name in scenes)
     return next((scene for scene in candidates if len(scene.frames) > 1), None)
@@ -118,7 +123,12 @@ def collect_summary(run_folder: Path, case: Case) -> dict:
 
 
 def write_summary(folder: Path, summary: dict) -> None:
-    """Write ``summary.json`` atomically."""
+    """Write ``summary.json`` into a folder atomically.
+
+    Args:
+        folder: Folder of the file.
+        summary: Content, see ``collect_summary``.
+    """
     partial = folder / ".summary.json.partial"
     partial.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     partial.rename(folder / "summary.json")

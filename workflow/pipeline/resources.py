@@ -50,8 +50,8 @@ def stage_resources(case: Case, walltime_factor: float = 1.0, cores: int = MOST_
 
     Args:
         case: The case.
-        walltime_factor: Factor on the wall time.
-        cores: Number of cores of the largest node.
+        walltime_factor: Factor on the predicted wall times, a reserve for slower machines.
+        cores: Number of cores of the largest node, which bounds the cores of a job.
 
     Returns:
         Resources by name of the stage, for stages that are jobs.

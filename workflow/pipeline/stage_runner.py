@@ -27,8 +27,8 @@ def run_stage(name: str, function: StageFunction, run: Run, product: Path) -> di
         product: Folder of the product; an existing one is replaced.
 
     Returns:
-        The record: seconds, core_seconds, forecast, machine, metrics, health, effects, continued, key, inputs, reads,
-        files.
+        Content of ``stage.json``: seconds and core_seconds (measured), forecast [s], machine, metrics, health, effects,
+        continued, key, inputs, reads (digests of upstream products), files (digests).
 
     Raises:
         StageError: An input file has changed since the start of the command, or a product is missing.
@@ -95,6 +95,12 @@ def core_seconds() -> float:
 
 def execute(name: str, function: StageFunction, run: Run, product: Path) -> bool:
     """Run a stage and print its result, or write its error message to the work folder.
+
+    Args:
+        name: Name of the stage.
+        function: Stage function, which writes products into a folder and returns findings.
+        run: Input of the stage.
+        product: Folder of the product; an existing one is replaced.
 
     Returns:
         Whether the stage completed. If not, traceback and message are in ``.<stage>.partial`` of the run folder.

@@ -74,12 +74,17 @@ def write_new_case(name: str, template: str, folder: Path = Path()) -> Path:
 
 
 def write_schema(folder: Path) -> None:
-    """Write the JSON schema to the folder of a new case file, where editors use it for completion."""
+    """Write the JSON schema of case files into a folder, where editors use it to complete a new case."""
     (folder / "reflowshock.schema.json").write_text(json.dumps(case_schema(), indent=2), encoding="utf-8")
 
 
 def case_text(case: Case, template: str) -> str:
-    """Write a case as TOML with comments."""
+    """Write a case as TOML with comments, every parameter in the user's unit.
+
+    Args:
+        case: Case to write.
+        template: Name of the shipped case that it starts from, named in a comment.
+    """
     blocks = [HEADER.format(name=case.case.name, template=template)]
     _add_table(blocks, "", case)
     return "\n".join(blocks)

@@ -94,7 +94,10 @@ def escape_unencodable() -> None:
 
 
 def complete(environment: MutableMapping[str, str]) -> None:
-    """Complete an environment for this process and its children; repeated calls change nothing.
+    """Add missing variables that this process and its children need; repeated calls change nothing.
+
+    Args:
+        environment: Variables by name, changed in place, usually ``os.environ``.
 
     Raises:
         EnvironmentProblem: No folder for temporary files is writable.
@@ -114,6 +117,9 @@ def complete(environment: MutableMapping[str, str]) -> None:
 
 def check_ranks(environment: Mapping[str, str]) -> None:
     """Raise if the command was started on several MPI ranks, each of which would do all the work.
+
+    Args:
+        environment: Variables by name, in which MPI gives number of ranks and rank.
 
     Raises:
         EnvironmentProblem: There are several ranks. The first rank prints the message while the others wait, because
@@ -197,6 +203,9 @@ def set_writable_folders(environment: MutableMapping[str, str]) -> None:
 def temporary_folder(environment: MutableMapping[str, str]) -> Path:
     """Return a writable folder for temporary files and set TMPDIR if children would choose another one.
 
+    Args:
+        environment: Variables by name; TMPDIR is changed in place.
+
     Raises:
         EnvironmentProblem: No folder is writable.
     """
@@ -212,7 +221,11 @@ def temporary_folder(environment: MutableMapping[str, str]) -> Path:
 
 
 def private_folder(temporary: Path) -> Path:
-    """Return a private temporary folder of this user, always the same so that compiled code is reused."""
+    """Return a private temporary folder of this user, always the same so that compiled code is reused.
+
+    Args:
+        temporary: Folder for temporary files, in which it is created if missing.
+    """
     folder = temporary / f"reflowshock-{os.getuid()}"
     with suppress(OSError):
         folder.mkdir(mode=0o700)
@@ -226,7 +239,12 @@ def private_folder(temporary: Path) -> Path:
 
 
 def can_write(folder: Path, make: bool = False) -> bool:
-    """Return whether a file can be written in a folder, by trying it, since permissions alone are not sufficient."""
+    """Return whether a file can be written in a folder, by trying it, since permissions alone are not sufficient.
+
+    Args:
+        folder: Folder to try.
+        make: Whether a missing folder is created; otherwise it counts as not writable.
+    """
     try:
         if make:
             folder.mkdir(parents=True, exist_ok=True)

@@ -114,7 +114,11 @@ def _describe_known(error: BaseException, where: Path | None) -> str:
 
 
 def describe_text(text: str) -> str:
-    """Return a plain description of a library message about exhausted resources, or an empty string."""
+    """Return a plain description of a library message about exhausted resources, or an empty string.
+
+    Args:
+        text: Message of a library.
+    """
     return next((words for pattern, words in LIBRARY_ERRORS if pattern.search(text)), "")
 
 
@@ -155,6 +159,9 @@ def one_line_errors() -> Iterator[None]:
 def run_app(app: Callable[..., Any]) -> None:
     """Run a Typer application; usage errors are reported in one line with exit code 2.
 
+    Args:
+        app: Typer application, which reads ``sys.argv``.
+
     Raises:
         SystemExit: Always, with the exit code, unless a command raises.
         BaseException: Any exception of the commands.
@@ -171,7 +178,7 @@ def run_app(app: Callable[..., Any]) -> None:
 
 
 def report_error(error: BaseException) -> int:
-    """Print an error in one line, write its details to a file, and return the exit code."""
+    """Print an error in one line on standard error, write its traceback to a file, and return the exit code."""
     if is_interrupt(error):
         _print_error("interrupted")
         return FAILED

@@ -21,7 +21,7 @@ def run_fem(run: Run, folder: Path, request: dict, title: str) -> None:
     Args:
         run: Case and cores.
         folder: Folder of the products, created here.
-        request: Contents of the input file except ``output``.
+        request: Content of the input file ``input.json`` except ``output``, as JSON data: ``mode``, meshes, parameters.
         title: Title of the progress bar.
 
     Raises:

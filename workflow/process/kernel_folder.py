@@ -19,6 +19,9 @@ def choose_kernel_folder(environment: MutableMapping[str, str] = os.environ) -> 
     """Set the folder of compiled kernels for this process and its children, before Numba is loaded.
 
     A writable folder chosen by the user stays. If no folder can be created, a temporary one is used.
+
+    Args:
+        environment: Variables by name, changed in place.
     """
     named = environment.get(VARIABLE)
     if named and ensure_writable(Path(named)):
@@ -31,7 +34,12 @@ def choose_kernel_folder(environment: MutableMapping[str, str] = os.environ) -> 
 
 
 def compilation_time(stages: Iterable[str], environment: Mapping[str, str] = os.environ) -> float:
-    """Predict the time that stages spend on compiling kernels, zero if the cache contains them [s]."""
+    """Predict the time that stages spend on compiling kernels [s]; zero if the cache contains them.
+
+    Args:
+        stages: Names of the stages to run.
+        environment: Variables by name, which give the folder of compiled kernels.
+    """
     named = environment.get(VARIABLE)
     folder = Path(named) if named else _default_folder(environment)
     cached = {path.name.rpartition("-")[0] for path in source_cache(folder).rglob("*.nbi")} if folder else set()

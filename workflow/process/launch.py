@@ -61,7 +61,11 @@ class StoppedProcesses:
 
 
 def find_stopped(root: int) -> list[int]:
-    """Return the stopped processes among a process and its descendants."""
+    """Return the process ids of those that are stopped (by a signal), among a process and its descendants.
+
+    Args:
+        root: Process id.
+    """
     parents: dict[int, int] = {}
     halted = []
     for folder in PROC.iterdir():
@@ -85,7 +89,11 @@ def _descends(process: int, root: int, parents: dict[int, int]) -> bool:
 
 
 def name(process: int) -> str:
-    """Return the name of a process for messages, with its MPI rank if it has one."""
+    """Return the name of a process for messages, with its MPI rank if it has one.
+
+    Args:
+        process: Process id.
+    """
     with suppress(OSError):
         variables = (PROC / str(process) / "environ").read_bytes().split(b"\0")
         environment = dict(os.fsdecode(variable).partition("=")[::2] for variable in variables)
@@ -131,6 +139,9 @@ def mpi_command(ranks: int, program: Sequence[str], oversubscribe: bool) -> list
         ranks: Number of MPI ranks.
         program: Program and arguments.
         oversubscribe: Whether there may be more ranks than cores.
+
+    Returns:
+        Program and arguments, for ``launch`` or ``subprocess``.
     """
     launcher = shlex.split(os.environ.get(LAUNCHER, "")) or [MPIRUN, *UNBOUND]
     if Path(launcher[0]).name != MPIRUN:
@@ -148,7 +159,7 @@ def launch(command: Sequence[str], on_line: Callable[[str], None], log: Path, pa
 
     Args:
         command: Program and arguments.
-        on_line: Function that takes each line of standard output.
+        on_line: Function that takes each line of standard output, as soon as it is written.
         log: File for standard error; a program may also explain its end in the file ``ERROR`` of the same folder.
         patience: How long a process may be stopped [s] before the program is ended.
 
@@ -192,7 +203,11 @@ def _read(path: Path) -> list[str]:
 
 
 def error_of(lines: Sequence[str]) -> str:
-    """Return the message that follows the last ``ERROR_PREFIX`` in the output of a program, or an empty string."""
+    """Return the message that follows the last ``ERROR_PREFIX`` in the output of a program, or an empty string.
+
+    Args:
+        lines: Lines of the output, in order.
+    """
     starts = [k for k, line in enumerate(lines) if line.startswith(ERROR_PREFIX)]
     return "\n".join(lines[starts[-1] :]).removeprefix(ERROR_PREFIX) if starts else ""
 
@@ -208,7 +223,11 @@ def without_traceback(text: str, log: Path) -> str:
 
 
 def ending(code: int) -> str:
-    """Describe how a program ended, from its exit code: below 0 or above 128 by a signal."""
+    """Describe how a program ended, from its exit code: below 0 or above 128 by a signal.
+
+    Args:
+        code: Exit code as ``subprocess`` returns it.
+    """
     number = -code if code < 0 else code - 128
     if number in ENDINGS:
         return ENDINGS[number]

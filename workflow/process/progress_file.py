@@ -34,14 +34,20 @@ class Progress:
 
 
 def write_progress_to(folder: Path) -> None:
-    """Write the progress of this process and its children to a folder."""
+    """Make this process and its children write their progress to ``progress.json`` in a folder, from now on."""
     os.environ[VARIABLE] = str((folder / NAME).resolve())
 
 
 def progress_writer(what: str) -> Callable[[float, str], None]:
-    """Return a function of share and text that writes the progress of an activity starting now.
+    """Return a function that writes the progress of an activity starting now.
 
     It does nothing before ``write_progress_to`` has set a folder, and ignores write errors (a full device).
+
+    Args:
+        what: Name of the activity.
+
+    Returns:
+        Function of the completed share, 0 to 1, and a text that replaces the name unless it is empty.
     """
     start, last = time.time(), [0.0]
     path = os.environ.get(VARIABLE)
@@ -61,7 +67,11 @@ def progress_writer(what: str) -> Callable[[float, str], None]:
 
 
 def read_progress(folder: Path) -> Progress | None:
-    """Return the progress of the stage that runs in a folder, or None if it has not written any."""
+    """Return the progress of the stage that runs in a folder, or None if it has not written any.
+
+    Args:
+        folder: Folder that was given to ``write_progress_to``.
+    """
     try:
         content = json.loads((folder / NAME).read_text(encoding="utf-8"))
         return Progress(str(content["what"]), float(content["share"]), max(time.time() - float(content["begin"]), 0.0))

@@ -93,7 +93,11 @@ def print_error(text: str) -> None:
 
 @contextmanager
 def interruptible(what: str) -> Iterator[None]:
-    """Exit with code 1 on Ctrl-C and print the given note."""
+    """Exit with code 1 on Ctrl-C in the block and print a note.
+
+    Args:
+        what: Note to the user, such as how to continue.
+    """
     try:
         yield
     except KeyboardInterrupt as error:
@@ -150,8 +154,11 @@ def progress_bar(description: str) -> Iterator[ProgressBar]:
 
     Without a terminal, only the description is printed. ``status --follow`` shows it in a second terminal.
 
+    Args:
+        description: Name of the activity.
+
     Yields:
-        Callback that updates the bar.
+        Function of the completed share, 0 to 1, and optionally a text that replaces the description.
     """
     columns = (
         TextColumn("  {task.description}", markup=False),
@@ -175,7 +182,16 @@ def progress_bar(description: str) -> Iterator[ProgressBar]:
 
 
 def text_table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]], remarks: bool = False) -> Table:
-    """Return a table of text; column titles wrap at words, values only in the first column and in remarks."""
+    """Return a table of text for the terminal.
+
+    Column titles wrap at words, values only in the first column and in remarks.
+
+    Args:
+        title: Title; empty for none.
+        head: Column titles.
+        rows: Cells of each row, one per column.
+        remarks: Whether the last column holds remarks, which wrap and are left-aligned.
+    """
     table = Table(title=title or None, title_justify="left", title_style="bold", show_edge=False, pad_edge=False)
     for column, name in enumerate(head):
         last = remarks and column == len(head) - 1

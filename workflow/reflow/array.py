@@ -56,7 +56,7 @@ class CarriedReflow:
 
 
 def records() -> tuple[type, ...]:
-    """Return the types that jobs and results may contain."""
+    """Return the types that the files of jobs and results of this module's functions may contain."""
     from reflowshock.particles.core.geometry import JointGeometry
     from reflowshock.particles.scenes.carried_joint import Carried
     from reflowshock.particles.steps.shape import JointShape, Snapshot
@@ -123,7 +123,15 @@ class JointArray:
 
 
 def carry(job: CarriedReflow, progress: Callable[[float], None]) -> "Carried":
-    """Carry a joint to its next position; this function runs in a process of the pool."""
+    """Bring a joint to rest at its next position; this function runs in a process of the pool.
+
+    Args:
+        job: Geometry, solder, and files of the joint; its present file is read and the next one written.
+        progress: Function that is called with the fraction done, 0 to 1.
+
+    Returns:
+        State and wrenches of the joint at rest.
+    """
     from reflowshock.particles.scenes.carried_joint import carry_joint
 
     before = None if job.before is None else job.checkpoint(job.before)
@@ -131,7 +139,11 @@ def carry(job: CarriedReflow, progress: Callable[[float], None]) -> "Carried":
 
 
 def finish(job: CarriedReflow, _progress: Callable[[float], None]) -> "JointShape":
-    """Return the shape of a joint with its history since the first reflow; runs in a process of the pool."""
+    """Return the shape of a joint with its history since the first reflow; runs in a process of the pool.
+
+    Args:
+        job: Solder, and files of the joint after its first reflow and at the end, which are read.
+    """
     from reflowshock.particles.scenes.carried_joint import carried_shape
 
     assert job.before is not None

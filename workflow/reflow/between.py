@@ -18,7 +18,16 @@ if TYPE_CHECKING:
 
 
 def thermal_effects(case: "PackageCase", thermal: Thermal, temperatures: Sequence[float]) -> dict[str, Decision]:
-    """Decide which effects act between solder and structure, at temperatures [K] with liquid solder."""
+    """Decide which effects act between solder and structure, at temperatures [K] with liquid solder.
+
+    Args:
+        case: Case of a package.
+        thermal: Temperatures of the case.
+        temperatures: Temperatures of the load steps with liquid solder [K].
+
+    Returns:
+        Name of an effect -> its decision: ``on``, ``why`` and, if predicted, ``influence``.
+    """
     from reflowshock.fem.estimates.thermal_effects import HEATED_EFFECTS, Heated, PackageSizes
     from reflowshock.meshing.board.pads import corner_axis
 
@@ -72,6 +81,9 @@ def frozen_displacement(case: "PackageCase", structure: "HeatedStructure", displ
         case: Case of a package.
         structure: Board and package.
         displacement: Displacement of the nodes, shape (n, 3) [m].
+
+    Returns:
+        Displacement of the nodes, shape (n, 3) [m].
     """
     from reflowshock.meshing.board.pads import lift
 

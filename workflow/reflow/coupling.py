@@ -207,7 +207,8 @@ def place_joints(drawn: "Mapping[str, JointGeometry]", pad_motion: Floats) -> "d
 
     Args:
         drawn: Geometry as drawn by joint name.
-        pad_motion: Motion of both pads of each joint, shape (joints, 2, 6) [m, rad].
+        pad_motion: Motion (three translations, three rotations) of the board pad and the package pad of each joint,
+            shape (joints, 2, 6) [m, rad].
     """
     from reflowshock.particles.core.plate import joint_plates, placed_geometry
 
@@ -220,7 +221,14 @@ def place_joints(drawn: "Mapping[str, JointGeometry]", pad_motion: Floats) -> "d
 
 
 def scale_of(geometries: "Sequence[JointGeometry]", solder: Solder, modes: "RigidModes", tolerance: float) -> Scale:
-    """Return the scales of the residuals: pi a gamma for forces, times the pad's radius a for moments."""
+    """Return the scales of the residuals: pi a gamma for forces, times the pad's radius a for moments.
+
+    Args:
+        geometries: Geometry of each joint, in the order of the structure's pads.
+        solder: Solder of one joint.
+        modes: Free rigid motions of the package.
+        tolerance: Tolerance of the relative residuals.
+    """
     radii = np.array([(geometry.radius_board, geometry.radius_package) for geometry in geometries])
     force = np.pi * radii * solder.surface_tension
     pull = np.repeat(np.stack((force, force * radii), axis=-1), 3, axis=-1)
@@ -255,6 +263,11 @@ def floating_height(geometry: "JointGeometry", solder: Solder, load: float) -> f
     """Return the nearest gap [m] at which a coaxial joint supports a load [N], or else the present gap.
 
     The force must decrease with the height, otherwise the equilibrium is unstable.
+
+    Args:
+        geometry: Joint with its present gap.
+        solder: Solder of the joint.
+        load: Force with which the package presses on the joint [N].
     """
     from scipy.optimize import brentq
 

@@ -29,6 +29,9 @@ def load_steps(thermal: Thermal) -> list[LoadStep]:
 
     Heating divides the range from the reference to the peak into equal steps; cooling takes the same steps in reverse.
     Melting and solidification are separate load steps.
+
+    Returns:
+        Temperature [K] and displacement of the die's corner [m] of each step.
     """
     rise = (thermal.peak - thermal.reference) / thermal.steps
     way = [thermal.reference + rise * number for number in range(thermal.steps)] if rise > 0.0 else []
@@ -60,7 +63,7 @@ class HeatedForecast:
 
 
 def forecast_heated(case: "PackageCase", thermal: Thermal) -> HeatedForecast:
-    """Predict load steps, exchanges and effects."""
+    """Predict load steps, effects, and number of exchanges between solder and structure of a coupled reflow."""
     steps = load_steps(thermal)
     effects = thermal_effects(case, thermal, [step.temperature for step in steps])
     each = EXCHANGES_TO_BEND if effects["solder_force"]["on"] else EXCHANGES_ONE_WAY

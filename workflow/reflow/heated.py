@@ -67,6 +67,9 @@ def reflow_heated(run: Run[PackageCase], thermal: Thermal, pads: "list[PadSite]"
         pads: Pad table as drawn, with the prescribed warpage.
         mesh: File with the flat mesh of board and package.
 
+    Returns:
+        Geometry and shape of each joint when the solder freezes, arrays of the structure, metrics and health checks.
+
     Raises:
         NotInBalance: A load step does not converge.
         ReflowError: A joint failed; the message gives its name.
@@ -124,7 +127,12 @@ def _no_loads(structure: "HeatedStructure") -> tuple[np.ndarray, np.ndarray]:
 
 
 def all_inputs(case: PackageCase, pads: "list[PadSite]") -> tuple:
-    """Return all inputs of a coupled reflow: case, pads, and a digest of the sources of its saved state."""
+    """Return everything on which a saved coupled reflow depends: tables of the case, pads, and a digest of the sources.
+
+    Args:
+        case: Case of a package.
+        pads: Pad table.
+    """
     folders = (Path(__file__).parent, Path(statics.__file__).parent)
     sources = digest_of_files(*(path for folder in folders for path in sorted(folder.glob("*.py"))))
     return case.package, case.board, case.warpage, case.solder, case.materials, case.thermal, pads, sources

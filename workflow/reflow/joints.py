@@ -31,7 +31,7 @@ class JointReflow:
 
 
 def records() -> tuple[type, ...]:
-    """Return the types that jobs and results may contain."""
+    """Return the types that the files of jobs and results of this module's functions may contain."""
     from reflowshock.particles.core.geometry import JointGeometry
     from reflowshock.particles.steps.shape import JointShape, Snapshot
 
@@ -61,6 +61,9 @@ def distinct_joints(geometries: "Mapping[str, JointGeometry]") -> list[JointGrou
 
     Args:
         geometries: Geometry by joint name; groups and their members keep this order.
+
+    Returns:
+        Groups of one joint or more, each with its canonical geometry and the orientation of its members.
     """
     from reflowshock.particles.scenes.orientation import canonical, sizes
 

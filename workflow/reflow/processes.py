@@ -93,6 +93,9 @@ def open_pool(run: Run[PackageCase], joints: int) -> JointPool:
     Args:
         run: Case, cores and folder of the checkpoints.
         joints: Number of joints of an exchange.
+
+    Returns:
+        Pool to be used as a context, which runs up to ``joints`` jobs at a time.
     """
     ranks = run.case.reflow.ranks
     if ranks is None:

@@ -46,24 +46,32 @@ class ProgressReporter:
 
 
 def name_of(work: Callable) -> str:
-    """Return the name of a function of a module, from which another process can import it."""
+    """Return the name of a module-level function, "module:function", by which another process can import it."""
     return f"{work.__module__}:{work.__qualname__}"
 
 
 def function_of(name: str) -> Callable:
-    """Import the function with a name from ``name_of``."""
+    """Import the module-level function with a name from ``name_of``."""
     module, _, function = name.partition(":")
     imported: Callable = getattr(import_module(module), function)
     return imported
 
 
 def records_of(work: Callable) -> tuple[type, ...]:
-    """Return the types that the files of jobs and results may contain, as listed by the module of the function."""
+    """Return the types that the files of jobs and results may contain, as listed by the module of the function.
+
+    Args:
+        work: Function of a module that has a function ``records``.
+    """
     return (JobResult, *sys.modules[work.__module__].records())
 
 
 def claim(path: Path) -> bool:
-    """Claim a job; return False if another rank has claimed it."""
+    """Claim a job by creating a file next to it; return False if another rank has claimed it.
+
+    Args:
+        path: File of the job.
+    """
     try:
         path.with_suffix(TAKEN).touch(exist_ok=False)
     except FileExistsError:
@@ -72,7 +80,15 @@ def claim(path: Path) -> bool:
 
 
 def run_job(path: Path, work: Callable) -> JobResult:
-    """Run the job in a file and return its value, or the message of its error."""
+    """Run the job in a file; errors are returned, not raised.
+
+    Args:
+        path: File with the job, which is read.
+        work: Module-level function of the job and of a reporter of the fraction done, which returns the result.
+
+    Returns:
+        Value of the function, or the message of its error.
+    """
     try:
         return JobResult(work(read_data(path, records_of(work)), ProgressReporter(path.stem)))
     except Exception as error:  # the launcher reports any error
@@ -80,11 +96,11 @@ def run_job(path: Path, work: Callable) -> JobResult:
 
 
 def main(folder: Path, work: Callable) -> int:
-    """Run jobs until none is left or one fails.
+    """Run jobs of a folder on this rank until none is left or one fails; other ranks run the same loop.
 
     Args:
-        folder: Folder with the files of jobs and results.
-        work: Function that runs a job.
+        folder: Folder of the job files ``*.job``; result files ``*.result`` are written next to them.
+        work: Module-level function of the job and of a reporter of the fraction done, which returns the result.
 
     Returns:
         Exit code: 1 if a job failed, else 0.

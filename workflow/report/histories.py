@@ -36,12 +36,12 @@ def read_modes(shock: Path, modes: tuple[str, ...] = MODES) -> tuple[dict[str, d
 
 
 def joint_stress(history: Arrays, joint: str, measure: Measure = VON_MISES) -> NDArray[np.float64]:
-    """Return the stress of a joint at its worse pad over time, shape (k,) [Pa].
+    """Return a stress of a joint over time, at each time the larger value of both pads, shape (k,) [Pa].
 
     Args:
         history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity.
         joint: Name of a joint in the history.
-        measure: Stress measure, such as von Mises or peel stress; the worse pad has the larger peak.
+        measure: Stress measure, such as von Mises or peel stress.
     """
     return measure.worse(history)[:, list(map(str, history["joints"])).index(joint)]
 

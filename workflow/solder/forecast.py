@@ -50,7 +50,7 @@ class SolderForecast:
 
 
 def forecast_solder(case: Case) -> SolderForecast:
-    """Predict effects, size, time step and cost of a scene of solder alone."""
+    """Predict effects, size, time step and cost of a scene of solder alone (drop, joint, drops), without running it."""
     return FORECASTS[case.kind](case)
 
 
@@ -154,7 +154,11 @@ FORECASTS: dict[str, Callable[[Any], SolderForecast]] = {
 
 
 def solder_size(case: Case) -> Size:
-    """Predict wall times and memory of the stages of a case."""
+    """Predict wall times and memory of the stages of a case.
+
+    Returns:
+        Seconds by stage, number of joints (1), and memory [B].
+    """
     forecast = forecast_solder(case)
     return Size(forecast.seconds, 1, BYTES_OF_PARTICLE * forecast.particles)
 

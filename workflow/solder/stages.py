@@ -137,9 +137,9 @@ def judge_drop(metrics: Numbers, verdict: str, effects: Mapping[str, Any]) -> Fi
     """Check a drop by volume, rest and the Young-Laplace shape; overflow is reported, but does not fail.
 
     Args:
-        metrics: Metric -> value and unit.
-        verdict: Verdict on the shape.
-        effects: Decided effects.
+        metrics: Name -> value and SI unit.
+        verdict: Verdict on the shape, such as "ok".
+        effects: Name of an effect -> its decision: ``on``, ``why`` and, if predicted, ``influence``.
 
     Returns:
         Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
@@ -159,6 +159,11 @@ def judge_joint(metrics: Numbers, verdict: str, effects: Mapping[str, Any]) -> F
 
     A package that is pulled off leaves an open joint. This is a valid result, checked by the remaining drops.
 
+    Args:
+        metrics: Name -> value and SI unit.
+        verdict: Verdict on the shape, such as "ok" or "open".
+        effects: Name of an effect -> its decision: ``on``, ``why`` and, if predicted, ``influence``.
+
     Returns:
         Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
     """
@@ -176,7 +181,12 @@ def judge_joint(metrics: Numbers, verdict: str, effects: Mapping[str, Any]) -> F
 
 
 def judge_drops(metrics: Numbers, expected: int, effects: Mapping[str, Any]) -> Findings:
-    """Check drops by their number, volume, rest and exact shapes; ``expected`` is the number of drops at the end.
+    """Check drops by their number, volume, rest and exact shapes.
+
+    Args:
+        metrics: Name -> value and SI unit.
+        expected: Number of drops at the end.
+        effects: Name of an effect -> its decision: ``on``, ``why`` and, if predicted, ``influence``.
 
     Returns:
         Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
@@ -189,6 +199,10 @@ def judge_drops(metrics: Numbers, expected: int, effects: Mapping[str, Any]) -> 
 
 def judge_oscillation(metrics: Numbers, effects: Mapping[str, Any]) -> Findings:
     """Check an oscillating drop by volume, and by the period and decay rate of Reid.
+
+    Args:
+        metrics: Name -> value and SI unit.
+        effects: Name of an effect -> its decision: ``on``, ``why`` and, if predicted, ``influence``.
 
     Returns:
         Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.

@@ -61,7 +61,14 @@ def check_folder(folder: Path, what: str, name: str, force: bool = False) -> Non
 
 
 def read_mark(folder: Path) -> dict[str, str] | None:
-    """Return kind and name of the contents of a run folder, or None for other folders."""
+    """Return what a marked folder contains, or None for folders that the program has not marked.
+
+    Args:
+        folder: Folder of a run, study or convergence study.
+
+    Returns:
+        Kind ("run", "study", …) and name of the case or study.
+    """
     try:
         mark = json.loads((folder / MARK).read_text(encoding="utf-8"))
         return {"holds": str(mark["holds"]), "name": str(mark["name"])}

@@ -23,7 +23,7 @@ class Change:
 
 
 def stage_inputs(case: Case, stage: Stage) -> dict:
-    """Return the parameters that a stage depends on, as dotted key -> SI value, and digests of its files."""
+    """Return the inputs that a stage depends on: dotted key -> SI value, and ``<key>.sha256`` -> digest of a file."""
     contents = [(f"{key}.sha256", _digest(path)) for key, path in case.files.items()]
     return {key: value for key, value in [*_flat(case.model_dump(mode="json")), *contents] if stage.depends_on(key)}
 
@@ -33,6 +33,9 @@ def product_keys(case: Case) -> dict[str, str]:
 
     A key is a digest of the parameters of the stage and of all upstream stages, and of the program version. The names
     of case and scale enter only the key of the report.
+
+    Returns:
+        Name of each stage -> key, hexadecimal digits.
     """
     keys: dict[str, str] = {}
     for stage in case.pipeline.stages:
@@ -47,7 +50,10 @@ def product_key(case: Case, stage: Stage, inputs: dict, follows: Sequence[str | 
         case: The case.
         stage: Stage that makes the product.
         inputs: Parameters of the stage, as returned by ``stage_inputs``.
-        follows: Product keys of the stages that it follows.
+        follows: Product keys of the stages that it follows, in order.
+
+    Returns:
+        First hexadecimal digits of a SHA-256.
     """
     content = {"version": __version__, "stage": f"{case.kind} {stage.name}", "inputs": inputs, "follows": follows}
     return digest_of(content)[:DIGITS]
@@ -59,12 +65,24 @@ def inputs_digest(case: Case) -> str:
 
 
 def digest_of(content: dict) -> str:
-    """Return the SHA-256 of a table, independent of the order of its keys."""
+    """Return the SHA-256 of a table as hexadecimal text, independent of the order of its keys.
+
+    Args:
+        content: JSON data.
+    """
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def compare(old: dict, new: dict) -> tuple[Change, ...]:
-    """List the keys whose values differ between two sets of inputs, in the order of the new set."""
+    """List the keys whose values differ between two sets of inputs, in the order of the new set, then of the old one.
+
+    Args:
+        old: Dotted key -> value, as from ``stage_inputs``.
+        new: Dotted key -> value.
+
+    Returns:
+        Key, old and new value; None for a key that a set lacks.
+    """
     keys = [*new, *(key for key in old if key not in new)]
     return tuple(Change(key, old.get(key), new.get(key)) for key in keys if old.get(key) != new.get(key))
 

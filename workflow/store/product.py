@@ -26,11 +26,11 @@ def seal(folder: Path, record: dict) -> dict:
     """Write the record of a complete product and flush all its files to disk.
 
     Args:
-        folder: Folder of the product.
-        record: Results of the stage, without ``files``.
+        folder: Folder of the product, into which ``stage.json`` is written.
+        record: Results of the stage, see ``run_stage``, without ``files``.
 
     Returns:
-        The record with ``files`` and the digest of the record itself.
+        The record with ``files`` (file name -> SHA-256) and the digest of the record itself.
     """
     files = {path.relative_to(folder).as_posix(): file_digest(path) for path in _files(folder)}
     sealed = json.loads(json.dumps(record | {"files": files}))  # the same types as after reading
@@ -42,7 +42,12 @@ def seal(folder: Path, record: dict) -> dict:
 
 
 def publish(made: Path, product: Path) -> None:
-    """Move a sealed product to its final path atomically and remove an older product there."""
+    """Move a sealed product to its final path atomically and remove an older product there.
+
+    Args:
+        made: Folder of the sealed product.
+        product: Final path of this folder.
+    """
     product.parent.mkdir(parents=True, exist_ok=True)
     if os.path.lexists(product):
         old = made.with_name(f".{product.name}.old")
@@ -64,7 +69,11 @@ def discard(path: Path) -> None:
 
 
 def read_record(product: Path) -> dict | None:
-    """Return the record of a product, or None if it is missing or damaged."""
+    """Return the content of a product's ``stage.json``, or None if it is missing or damaged.
+
+    Args:
+        product: Folder of the product.
+    """
     try:
         record = json.loads((product / RECORD).read_text(encoding="utf-8"))
         unsealed = {key: value for key, value in record.items() if key != SEAL}
@@ -74,7 +83,11 @@ def read_record(product: Path) -> dict | None:
 
 
 def damage(product: Path) -> tuple[str, ...]:
-    """List the damaged or missing files of a product as messages; empty if all files are intact."""
+    """List the damaged or missing files of a product as messages; empty if all files are intact.
+
+    Args:
+        product: Folder of the product; all its files are read.
+    """
     record = read_record(product)
     if record is None:
         return (f"{RECORD} {'was modified' if (product / RECORD).exists() else 'is missing'}",)
@@ -92,7 +105,11 @@ def damage(product: Path) -> tuple[str, ...]:
 
 
 def content_digest(record: dict) -> str:
-    """Return the digest of all files of a product except its record, which contains wall times."""
+    """Return the digest of all files of a product except its record, which contains wall times.
+
+    Args:
+        record: Record of the product; its ``files`` are file name -> digest.
+    """
     return digest_of(record["files"])
 
 

@@ -34,6 +34,9 @@ def examine(store: Store, point: Point) -> dict[str, StageState]:
     """Return the state of each stage, in order, by checking every file of every product.
 
     An intact product stays valid when an upstream product is rebuilt with the same content.
+
+    Returns:
+        Name of a stage -> whether it has to run, and why.
     """
     states: dict[str, StageState] = {}
     records = shown_records(store, point)
@@ -86,7 +89,13 @@ def why_stale(state: StageState) -> str:
 
 
 def failed_checks(store: Store, point: Point, until: str) -> list[str]:
-    """List the failed health checks of stages as messages; a stage without a record counts as failed."""
+    """List the failed health checks of stages as messages; a stage without a record counts as failed.
+
+    Args:
+        store: Store of the products.
+        point: Point to check.
+        until: Last stage to check.
+    """
     failures = []
     for stage in point.case.pipeline.upstream(until):
         record = store.record(point, stage.name)

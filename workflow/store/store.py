@@ -115,6 +115,9 @@ def reads(products: Mapping[str, Path], case: Case, stage: Stage) -> dict[str, s
         products: Stage -> folder of its product.
         case: The case.
         stage: Stage that reads the products.
+
+    Returns:
+        Name of each stage that it reads, directly or indirectly -> digest of its product.
     """
     digests: dict[str, str | None] = {}
     for name in case.pipeline.read_by(stage.name):

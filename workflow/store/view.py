@@ -54,7 +54,15 @@ def show(store: Store, point: Point, stages: Iterable[str]) -> list[str]:
 
 
 def list_program_files(store: Store, folder: Path) -> dict[str, Link]:
-    """Return the files of the program in a run folder, by name."""
+    """Return the files of the program in a run folder, by path relative to it.
+
+    Args:
+        store: Store with the list of these files; if it is lost, they are recognised by their content.
+        folder: Folder of a run or study.
+
+    Returns:
+        Path -> its source in the store and its digest.
+    """
     try:
         table = json.loads(_list(store, folder).read_text(encoding="utf-8"))
         return {str(name): Link(str(source), str(digest)) for name, (source, digest) in table.items()}
@@ -80,7 +88,7 @@ def _recognised(store: Store, folder: Path) -> dict[str, Link]:
 
 
 def shown_records(store: Store, point: Point) -> dict[str, dict]:
-    """Return the records of the products that a run folder links, by stage."""
+    """Return the records (content of ``stage.json``) of the products that a run folder links, by stage name."""
     sources = {name: link.source for name, link in list_program_files(store, store.run_folder(point)).items()}
     source_by_stage = {stage.name: sources.get(stage.record) for stage in point.case.pipeline.stages}
     records = {name: read_record((store.home / source).parent) for name, source in source_by_stage.items() if source}
@@ -128,7 +136,11 @@ def remove_all_links(store: Store) -> None:
 
 
 def remove_unused(store: Store) -> tuple[int, int]:
-    """Remove products that no run folder links, and interrupted work; return the number of each."""
+    """Remove products that no run folder links, and interrupted work.
+
+    Returns:
+        Number of removed products, and number of removed work folders.
+    """
     linked = {
         Path(link.source).parts[1] for folder in _folders(store) for link in list_program_files(store, folder).values()
     }

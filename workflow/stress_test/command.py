@@ -46,6 +46,9 @@ class Request:
 def stress_test(request: Request) -> bool:
     """Run fixed and random hard cases and write the results.
 
+    Args:
+        request: Cases, families, number and seed of random cases, cores and output folder.
+
     Returns:
         Whether all cases stay within their bounds.
 

@@ -121,6 +121,14 @@ def measure(
 
 
 def with_errors(measured: dict[str, float], exact: dict[str, float]) -> dict[str, float]:
-    """Return measured values with their exact values ``<name>_exact`` and relative errors ``<name>_error``."""
+    """Return measured values with their exact values ``<name>_exact`` and relative errors ``<name>_error``.
+
+    Args:
+        measured: Measured values by name.
+        exact: Exact values by the same names.
+
+    Returns:
+        Name -> measured value, ``<name>_exact`` -> exact value, ``<name>_error`` -> relative error.
+    """
     errors = {f"{name}_error": value / exact[name] - 1.0 for name, value in measured.items()}
     return measured | {f"{name}_exact": value for name, value in exact.items()} | errors

@@ -161,7 +161,7 @@ def measure(
 def wave_error(
     layers: Layers, pulse: Pulse, heights: Mapping[str, float], history: Mapping[str, NDArray[np.float64]]
 ) -> float:
-    """Return the relative L2 error of the velocities over time and points.
+    """Return the relative L2 error of the velocities over all times and points, against the exact solution.
 
     Args:
         layers: Layers of the bar.
@@ -175,7 +175,15 @@ def wave_error(
 
 
 def passage_times(layers: Layers, heights: Mapping[str, float]) -> dict[str, tuple[str, float]]:
-    """Return the point of each compared wave and the time at which the wave reaches it [s]."""
+    """Return when the transmitted and the reflected wave pass the points at which they are compared.
+
+    Args:
+        layers: Layers of the bar.
+        heights: Heights of the points ``far`` and ``beyond`` [m].
+
+    Returns:
+        ``transmitted_velocity`` and ``reflected_velocity`` -> name of the point and arrival time of the wave there [s].
+    """
     first = layers.lengths[0]
     return {
         "transmitted_velocity": ("beyond", layers.travel(0.0, heights["beyond"])),

@@ -29,6 +29,9 @@ Arrays = Mapping[str, NDArray]
 def of_mesh(elements: Mapping[str, int]) -> Findings:
     """Return the numbers of elements of the layers as metrics.
 
+    Args:
+        elements: Name of a layer -> number of its elements.
+
     Returns:
         Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
     """
@@ -40,6 +43,10 @@ def of_motion(results: Mapping[str, dict]) -> Findings:
     """Collect metrics and health checks from the ``result.json`` of each solver.
 
     Names of all solvers but the first get the solver as a prefix.
+
+    Args:
+        results: Solver -> content of its ``result.json`` (``model``, ``metrics``, ``health``, ``timings``,
+            ``coupling``), the main solver first.
 
     Returns:
         Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
@@ -59,7 +66,7 @@ def of_comparison(case: StructureCase, folders: Mapping[str, Path]) -> Findings:
 
     Args:
         case: Case of a structure.
-        folders: Folder with the products of each solver; the first solver gives the main metrics.
+        folders: Solver -> folder with its products, which are read; the first solver gives the main metrics.
 
     Returns:
         Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
@@ -88,12 +95,26 @@ def of_comparison(case: StructureCase, folders: Mapping[str, Path]) -> Findings:
 
 
 def two_scale_errors(differences: Mapping[str, float]) -> dict[str, float]:
-    """Rename differences from a DNS to errors of the two-scale model."""
+    """Rename differences from a DNS, such as ``strain_difference``, to ``two_scale_strain_error``; values stay.
+
+    Args:
+        differences: Name, such as "displacement_difference" -> relative L2 difference of a history.
+
+    Returns:
+        Name, such as "two_scale_displacement_error" -> the same value.
+    """
     return {f"two_scale_{name.replace('_difference', '_error')}": value for name, value in differences.items()}
 
 
 def cost_ratio(folders: Mapping[str, Path]) -> dict:
-    """Return the ratios of core time and wall time of the coupled run to the DNS, without start-up, as metrics."""
+    """Return the cost of the coupled run over the cost of the DNS, without start-up, as metrics.
+
+    Args:
+        folders: Folders of the solvers "explicit" (the coupled run) and "dns", whose ``result.json`` is read.
+
+    Returns:
+        Metrics ``two_scale_dns_core_ratio`` (processor time) and ``two_scale_dns_time_ratio`` (wall time).
+    """
     results = [
         json.loads((folders[solver] / "result.json").read_text(encoding="utf-8")) for solver in ("explicit", "dns")
     ]
@@ -106,19 +127,34 @@ def cost_ratio(folders: Mapping[str, Path]) -> dict:
 
 
 def read_history(folder: Path) -> dict[str, NDArray]:
-    """Read the histories that a solver wrote."""
+    """Return the arrays of a solver's ``history.npz`` by name, such as ``time`` and ``displacement@<watch point>``.
+
+    Args:
+        folder: Folder of the solver.
+    """
     with np.load(folder / "history.npz") as arrays:
         return dict(arrays)
 
 
 def read_modes(folder: Path) -> list[dict]:
-    """Read the natural modes that a solver wrote, lowest first, or an empty list."""
+    """Read the natural modes that a solver wrote, lowest first; empty if it wrote none.
+
+    Args:
+        folder: Folder of the solver.
+
+    Returns:
+        Records with ``mode`` (number), ``frequency`` [Hz] and ``mass_fraction`` by axis.
+    """
     path = folder / "modes.json"
     return json.loads(path.read_text(encoding="utf-8")) if path.exists() else []
 
 
 def read_positions(folder: Path) -> dict[str, tuple[float, float, float]]:
-    """Read the node position at which the motion of each watch point is recorded [m]."""
+    """Return, by watch point, the position of the node at which its motion is recorded, (x, y, z) [m].
+
+    Args:
+        folder: Folder of the solver, whose ``result.json`` is read.
+    """
     watch = json.loads((folder / "result.json").read_text(encoding="utf-8"))["model"]["watch"]
     return {name: point["node_at"] for name, point in watch.items()}
 
@@ -139,7 +175,15 @@ class Motion:
 
 
 def compare_with_references(case: StructureCase, motion: Motion) -> tuple[dict, dict]:
-    """Return metrics and health checks of all references of a case, for one solver."""
+    """Compare the motion that one solver computed with all references of a case.
+
+    Args:
+        case: Case of a structure.
+        motion: Natural modes, histories and positions of the watch points.
+
+    Returns:
+        Metrics (``value``, ``unit``) by name, and health checks (``value``, ``limit``, ``ok``) by name.
+    """
     metrics: dict = {}
     health: dict = {}
     for reference in case.references.values():
@@ -252,7 +296,7 @@ def exact_velocities(
     Args:
         case: Case of a structure.
         reference: Reference solution of a bar.
-        positions: Position of each watch point [m].
+        positions: Position (x, y, z) of each watch point by name [m].
         times: Times, shape (n,) [s].
     """
     layers, pulse = layers_of(case), _pulse_of(case, reference.load)

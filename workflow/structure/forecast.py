@@ -63,7 +63,7 @@ class StructureForecast:
 
 
 def forecast_structure(case: StructureCase) -> StructureForecast:
-    """Predict sizes, time steps and cost of a run."""
+    """Predict sizes, time steps and cost of a run, without running it."""
     from reflowshock.fem.estimates.solver_cost import forecast_solvers
     from reflowshock.fem.estimates.structure_effects import effects
 
@@ -86,7 +86,10 @@ def forecast_coupled(case: StructureCase, layers: Mapping[str, LayerForecast], u
     Args:
         case: Case of a structure.
         layers: Size and critical step of each layer.
-        update: Time of one update of one element [s].
+        update: Wall time of one update of one element on one core [s].
+
+    Returns:
+        Fine layers, window and cost; None for a case without coupling.
     """
     from reflowshock.fem.problem.structure import fine_layers
 
@@ -104,7 +107,12 @@ def forecast_coupled(case: StructureCase, layers: Mapping[str, LayerForecast], u
 
 
 def critical_step(case: StructureCase, layers: Mapping[str, LayerForecast]) -> float:
-    """Predict the critical time step of all elements with damping [s]."""
+    """Return the predicted critical time step of the explicit scheme with damping, over all elements [s].
+
+    Args:
+        case: Case of a structure.
+        layers: Size and critical step of each layer by name; mass-scaled layers are left out.
+    """
     from reflowshock.fem.estimates.estimate import damped_critical_step
 
     undamped = min(layer.critical_step for layer in layers.values() if not layer.mass_scaled)
@@ -112,7 +120,12 @@ def critical_step(case: StructureCase, layers: Mapping[str, LayerForecast]) -> f
 
 
 def forecast_steps(case: StructureCase, layers: Mapping[str, LayerForecast]) -> dict[str, float]:
-    """Predict the time step of each solver [s]."""
+    """Predict the time step [s] of each solver: "explicit", "dns" and "implicit".
+
+    Args:
+        case: Case of a structure.
+        layers: Size and critical step of each layer by name.
+    """
     from reflowshock.fem.estimates.solver_cost import implicit_step
     from reflowshock.fem.loads.structure_pulses import pulse_durations, pulses_of
 
@@ -158,6 +171,10 @@ def step_problems(case: StructureCase) -> Iterator[Problem]:
 def shorter_than_window(case: StructureCase, window: float) -> Iterator[Problem]:
     """Yield problems of pulses that are shorter than the coupling window [s].
 
+    Args:
+        case: Case of a structure.
+        window: Length of the coupling window [s].
+
     Yields:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
     """
@@ -172,7 +189,7 @@ def shorter_than_window(case: StructureCase, window: float) -> Iterator[Problem]
 
 
 def forecast_layers(case: StructureCase) -> dict[str, LayerForecast]:
-    """Predict the size and critical time step of every layer."""
+    """Predict the number of elements and the critical time step of every layer, by its name."""
     import numpy as np
 
     from reflowshock.fem.elements.box_step import box_element_step
@@ -188,7 +205,12 @@ def forecast_layers(case: StructureCase) -> dict[str, LayerForecast]:
 
 
 def added_mass(case: StructureCase, layers: Mapping[str, LayerForecast]) -> float:
-    """Predict the mass added by raising the steps of mass-scaled layers to the smallest of the others [kg]."""
+    """Predict the mass added by raising the steps of mass-scaled layers to the smallest of the others [kg].
+
+    Args:
+        case: Case of a structure.
+        layers: Size and critical step of each layer by name.
+    """
     body, materials = case.structure, case.problem.layer_materials
     target = min(layer.critical_step for layer in layers.values() if not layer.mass_scaled)
     area = case.box.extent(0) * case.box.extent(1)
@@ -203,7 +225,11 @@ def added_mass(case: StructureCase, layers: Mapping[str, LayerForecast]) -> floa
 
 
 def structure_size(case: StructureCase) -> Size:
-    """Predict time, ranks and memory of a case."""
+    """Predict wall times and memory of a case.
+
+    Returns:
+        Seconds by stage, 1 as number of joints, and memory [B].
+    """
     outlook = forecast_structure(case)
     elements = sum(layer.elements for layer in outlook.layers.values())
     implicit = outlook.solvers.implicit.memory if "implicit" in case.dynamics.solvers else 0.0
@@ -211,7 +237,7 @@ def structure_size(case: StructureCase) -> Size:
 
 
 def structure_tables(case: StructureCase, outlook: StructureForecast) -> Iterator[RenderableType]:
-    """Yield the tables of layers and solvers."""
+    """Yield the tables of layers and solvers that ``plan`` prints."""
     yield layers_table(outlook)
     yield solvers_table(case, outlook)
 

@@ -13,7 +13,16 @@ from reflowshock.workflow.structure.references import Record
 
 
 def recorded_acceleration(case: StructureCase, reference: Record, end: float):
-    """Return a recorded acceleration as an ``Acceleration``, filtered like the run and cut at its end [s]."""
+    """Read a recorded acceleration, filter it as the run's and cut it at the end of the run.
+
+    Args:
+        case: Case with the filter.
+        reference: Record with the table of the accelerometer.
+        end: End of the run [s].
+
+    Returns:
+        ``Acceleration`` with times [s], raw and filtered values [m/s^2].
+    """
     from reflowshock.fem.loads.pulse_table import read_pulse
     from reflowshock.fem.output.acceleration import Acceleration, apply_low_pass
 
@@ -31,7 +40,11 @@ def compare_with_record(case: StructureCase, reference: Record, history: Mapping
     Args:
         case: Case of a structure.
         reference: Recorded acceleration at a watch point.
-        history: Arrays of ``history.npz`` of a solver.
+        history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity of
+            the watch points.
+
+    Returns:
+        Metrics by name: ``measured_<peak>@<watch point>`` [G] and ``<peak>_difference@<watch point>``.
     """
     from reflowshock.fem.loads.structure_pulses import pulses_of
     from reflowshock.fem.output.acceleration import watch_accelerations

@@ -146,6 +146,10 @@ AnyReference = Annotated[
 def reference_problems(references: dict[str, AnyReference], problem: StructureProblem) -> Iterator[Problem]:
     """Yield the problems of all references with loads, watch points, modes and layers of the case.
 
+    Args:
+        references: References by name.
+        problem: Structure with its layers, loads and watch points.
+
     Yields:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
     """

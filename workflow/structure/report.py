@@ -55,7 +55,15 @@ MODEL_ROWS = (
 
 
 def add_structure(run_folder: Path, case: StructureCase, context: dict, metrics: dict) -> None:
-    """Add the tables, charts and scenes of a structure to the context of the report template."""
+    """Add the tables, charts and scenes of a structure to the context of the report template.
+
+    Args:
+        run_folder: Run folder; without the product of the shock nothing is added.
+        case: Case of the run.
+        context: Context of the page's template, changed in place: ``headline``, ``points``, ``curves``, ``tables``,
+            ``scenes`` and others.
+        metrics: Name -> record with ``value`` (SI) and ``unit``.
+    """
     folder = run_folder / "shock"
     if not folder.is_dir():
         return
@@ -85,7 +93,12 @@ def add_structure(run_folder: Path, case: StructureCase, context: dict, metrics:
 
 
 def add_two_scales(result: Mapping, context: dict) -> None:
-    """Add the tables of coupling, step levels and rank placement of a two-scale run."""
+    """Add the tables of coupling, step levels and rank placement of a two-scale run.
+
+    Args:
+        result: Content of a solver's ``result.json``; without ``coupling`` nothing is added.
+        context: Context of the page's template, changed in place: ``tables``.
+    """
     coupling = result.get("coupling")
     if coupling is None:
         return
@@ -102,7 +115,14 @@ def meshed_part(case: StructureCase) -> str:
 
 
 def headline(metrics: dict) -> list[dict]:
-    """Return labels and values of the figures at the top of the page, the first metric of each quantity."""
+    """Return the figures at the top of the page: the first metric of each quantity.
+
+    Args:
+        metrics: Name -> record with ``value`` (SI) and ``unit``.
+
+    Returns:
+        Records with ``label`` and ``value`` as text.
+    """
     figures = []
     for quantity_name in HEADLINE:
         name = next((name for name in metrics if name.split("@")[0] == quantity_name), None)
@@ -112,13 +132,18 @@ def headline(metrics: dict) -> list[dict]:
 
 
 def label(name: str) -> str:
-    """Return the name of a metric as readable text."""
+    """Return the name of a metric as readable text: "peak strain at P1" for ``peak_strain@P1``."""
     quantity_name, _, location = name.partition("@")
     return quantity_name.replace("_", " ") + (f" at {location}" if location else "")
 
 
 def text(name: str, metric: dict) -> str:
-    """Format the value of a metric: errors and differences in per cent, strains in microstrain."""
+    """Format the value of a metric: errors and differences in per cent, strains in microstrain.
+
+    Args:
+        name: Name of the metric, which decides on the format.
+        metric: Record with ``value`` (SI) and ``unit``.
+    """
     quantity_name = name.partition("@")[0]
     if quantity_name.endswith(FRACTIONS):
         return percent(metric["value"])
@@ -129,12 +154,27 @@ def text(name: str, metric: dict) -> str:
 
 
 def metric_table(metrics: dict) -> dict:
-    """Return a table of all metrics."""
+    """Return a table of all metrics.
+
+    Args:
+        metrics: Name -> record with ``value`` (SI) and ``unit``.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text).
+    """
     return {"head": ["metric", "value"], "rows": [[label(name), text(name, value)] for name, value in metrics.items()]}
 
 
 def reference_table(metrics: dict) -> dict | None:
-    """Return a table of computed and exact values with errors, or None without exact values."""
+    """Return a table of computed and exact values with errors, or None without exact values.
+
+    Args:
+        metrics: Name -> record with ``value`` (SI) and ``unit``; a value ``x`` with an exact one has ``x_exact`` and
+            ``x_error``.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text); None without exact values.
+    """
     rows = []
     for name, metric in metrics.items():
         if f"{name}_exact" in metrics:
@@ -144,7 +184,15 @@ def reference_table(metrics: dict) -> dict | None:
 
 
 def published_table(case: StructureCase, metrics: dict) -> dict | None:
-    """Return a table of computed and published values, or None without published values."""
+    """Return a table of computed and published values, or None without published values.
+
+    Args:
+        case: Case with its references.
+        metrics: Name -> record with ``value`` (SI) and ``unit``.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text); None without published values.
+    """
     rows = [
         [
             label(published.metric),
@@ -159,7 +207,15 @@ def published_table(case: StructureCase, metrics: dict) -> dict | None:
 
 
 def model_table(results: Mapping[str, dict]) -> dict:
-    """Return a table of model size and time steps with one column per solver."""
+    """Return a table of model size and time steps with one column per solver.
+
+    Args:
+        results: Solver -> content of its ``result.json`` (``model``, ``metrics``, ``health``, ``timings``,
+            ``coupling``).
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text).
+    """
     records = [result["model"] for result in results.values()]
     return {
         "head": ["model", *results],
@@ -181,7 +237,11 @@ def _add_scenes(folder: Path, case: StructureCase, history: Mapping[str, np.ndar
 
 
 def model_series(folder: Path) -> list[Path]:
-    """Return the existing field series (PVD) of a run, one file per model."""
+    """Return the existing field series (PVD files) of a solver, one for each model.
+
+    Args:
+        folder: Folder of the solver.
+    """
     return [path for role in ROLES if (path := folder / f"{role}.pvd").exists()]
 
 
@@ -191,17 +251,41 @@ def _peak_time(case: StructureCase, history: Mapping[str, np.ndarray]) -> float:
 
 
 def point_curves(histories: Histories, point: str) -> list[Chart]:
-    """Return charts of displacement, velocity, strain and stress at a watch point, each of its largest component."""
+    """Return charts of displacement, velocity, strain and stress at a watch point, each of its largest component.
+
+    Args:
+        histories: Solver -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity.
+        point: Name of the watch point.
+
+    Returns:
+        Interactive charts for the report page.
+    """
     return [component_chart(histories, name, point) for name in ("displacement", "velocity", "strain", "stress")]
 
 
 def reaction_curves(histories: Histories, supports: list[str]) -> list[Chart]:
-    """Return one chart per support with the largest component of its reaction."""
+    """Return one chart per support with the largest component of its reaction.
+
+    Args:
+        histories: Solver -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity.
+        supports: Names of the supports.
+
+    Returns:
+        Interactive charts for the report page.
+    """
     return [component_chart(histories, "reaction", support, support) for support in supports]
 
 
 def energy_curves(histories: Histories) -> list[Chart]:
-    """Return charts of each solver's nonzero energies, and of the balance relative to the largest energy."""
+    """Return charts of each solver's nonzero energies, and of the balance relative to the largest energy.
+
+    Args:
+        histories: Solver -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity;
+            energies in J.
+
+    Returns:
+        Interactive charts for the report page.
+    """
     charts = []
     for solver, history in histories.items():
         time, largest = history["time"] / MILLI, _largest(history)
@@ -221,9 +305,10 @@ def component_chart(histories: Histories, quantity: str, location: str, title: s
     """Return a chart of one component of a vector or tensor: the largest one in the first history.
 
     Args:
-        histories: Histories of each solver.
+        histories: Solver -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity; the
+            quantity has shape (k, 3) or (k, 6).
         quantity: Key of ``UNITS``.
-        location: Watch point or support.
+        location: Name of a watch point or support.
         title: Title of the chart.
     """
     name = f"{quantity}@{location}"

@@ -14,7 +14,16 @@ STRESS = "von Mises stress"
 
 
 def deformation_scene(models: Sequence[Path], parts: Sequence[str], time: float) -> Scene:
-    """Return a scene with the models of a structure at all stored times, starting at the one nearest to a time [s]."""
+    """Return a scene with the models of a structure at all stored times, starting at the one nearest to a time [s].
+
+    Args:
+        models: PVD files of the models, one for each.
+        parts: Names of the layers, in the order of their numbers in the files.
+        time: Time of the frame that is shown first [s].
+
+    Returns:
+        Interactive 3D scene for the report page.
+    """
     series = FieldSeries.read(models, ("part", "von_mises"), time)
     groups = _layers(series, parts, {STRESS: series.fields["von_mises"] / MEGA})
     size = float(np.linalg.norm(series.displacement, axis=2).max())
@@ -32,7 +41,16 @@ def deformation_scene(models: Sequence[Path], parts: Sequence[str], time: float)
 
 
 def modes_scene(path: Path, parts: Sequence[str], modes: Sequence[Mapping]) -> Scene:
-    """Return a scene with one natural mode per frame."""
+    """Return a scene with one natural mode per frame.
+
+    Args:
+        path: PVD file of the modes.
+        parts: Names of the layers, in the order of their numbers in the file.
+        modes: Records with ``mode`` (number) and ``frequency`` [Hz], see ``read_modes``.
+
+    Returns:
+        Interactive 3D scene for the report page.
+    """
     series = FieldSeries.read([path], ("part",))
     size = float(np.linalg.norm(series.displacement, axis=2).max()) or 1.0
     frames = [f"mode {mode['mode']}: {mode['frequency']:.1f} Hz" for mode in modes[: len(series.times)]]

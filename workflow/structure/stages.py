@@ -34,12 +34,23 @@ def run_solver(run: Run[StructureCase], folder: Path, solver: str) -> None:
 
 
 def solver_folders(folder: Path) -> dict[str, Path]:
-    """Return the folder of each solver that ran, explicit first."""
+    """Return the folder of each solver that ran, in the order explicit, implicit, dns.
+
+    Args:
+        folder: Folder of the stage shock.
+    """
     return {solver: folder / solver for solver in SOLVERS if (folder / solver).is_dir()}
 
 
 def read_results(folder: Path) -> dict[str, dict]:
-    """Return ``result.json`` of each solver that ran, explicit first."""
+    """Return ``result.json`` of each solver that ran, explicit first.
+
+    Args:
+        folder: Folder of the stage shock.
+
+    Returns:
+        Solver -> content of its ``result.json`` (``model``, ``metrics``, ``health``, ``timings``, ``coupling``).
+    """
     return {
         solver: json.loads((solver_folder / "result.json").read_text(encoding="utf-8"))
         for solver, solver_folder in solver_folders(folder).items()

@@ -96,7 +96,12 @@ def show_forecast(points: Points, store: Store) -> None:
 
 
 def predicted_study_seconds(points: Points, store: Store) -> float:
-    """Predict the total wall time [s] of the missing products of a study, computed one after the other."""
+    """Predict the total wall time [s] of the missing products of a study, computed one after the other.
+
+    Args:
+        points: Points of the study.
+        store: Store of the products, which is examined.
+    """
     possible = list(points.possible.values())
     return sum(stage.seconds or 0.0 for stage in forecast_stages(possible, list_missing(store, possible, LAST)))
 
@@ -149,7 +154,13 @@ def _write_results(store: Store, study: Study, rows: Sequence[Row]) -> None:
 
 
 def results(points: Points, store: Store, failed: dict[str, str]) -> list[Row]:
-    """Return a row for each point, in the order of the study."""
+    """Return a row for each point, in the order of the study.
+
+    Args:
+        points: Points of the study, possible and impossible ones.
+        store: Store of the products.
+        failed: Key of a point -> reason of its failure.
+    """
     keys = points.study.design.keys
     rows = [row_of(index + 1, store, point, keys, failed.get(point.key)) for index, point in points.possible.items()]
     rows += [
@@ -160,7 +171,7 @@ def results(points: Points, store: Store, failed: dict[str, str]) -> list[Row]:
 
 
 def warn_of_metrics(points: Points, store: Store, first: Point) -> None:
-    """Warn of metrics of a study that the first complete point lacks, so that the user can stop early."""
+    """Print a warning of metrics of a study that the first complete point lacks, so that the user can stop early."""
     show_products(store, first)
     row = row_of(1, store, first, points.study.design.keys, None)
     available = _metrics_of(points.study, [row])
@@ -204,7 +215,13 @@ def _required_type(study: Study, name: str) -> str:
 
 
 def show_results(study: Study, rows: Sequence[Row], folder: Path) -> None:
-    """Print the best points, the main effects, and failures."""
+    """Print the best points, the main effects, and failures.
+
+    Args:
+        study: Study.
+        rows: Results of the points.
+        folder: Folder of the study, named in the output.
+    """
     ranking = tables.ranking(study, rows)
     if ranking["rows"]:
         count = min(RANKED_POINTS, len(ranking["rows"]))

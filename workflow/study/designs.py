@@ -152,7 +152,12 @@ class Design:
 
 
 def grid_axes(table: Mapping[str, object], problems: list[Problem]) -> Iterator[Design]:
-    """Yield a design for each line of ``[grid]``: ``"keys" = values``."""
+    """Yield a design for each line ``"keys" = values`` of ``[grid]``.
+
+    Args:
+        table: Keys, joined by commas if they vary together -> list of values.
+        problems: List to which errors are added.
+    """
     for text, values in table.items():
         keys = _keys(text)
         if not isinstance(values, list) or not values:
@@ -172,7 +177,12 @@ def grid_axes(table: Mapping[str, object], problems: list[Problem]) -> Iterator[
 
 
 def list_axis(rows: Sequence[Mapping[str, object]], problems: list[Problem]) -> Design:
-    """Return the design of ``[[list]]``; its factors are the keys that differ between rows."""
+    """Return the design of ``[[list]]``; its factors are the keys that differ between rows.
+
+    Args:
+        rows: Tables ``[[list]]``, each dotted key -> value.
+        problems: List to which errors are added.
+    """
     points = tuple({key: as_text(value) for key, value in row.items()} for row in rows)
     for index, point in enumerate(points):
         if missing := [key for key in points[0] if key not in point] + [key for key in point if key not in points[0]]:
@@ -186,7 +196,13 @@ def list_axis(rows: Sequence[Mapping[str, object]], problems: list[Problem]) -> 
 
 
 def sample_axis(table: Mapping[str, object], cube: Hypercube, problems: list[Problem]) -> Design:
-    """Return the design of ``[latin_hypercube]``; each line ``"keys" = [low, high]`` is one dimension."""
+    """Return the design of ``[latin_hypercube]``; each line ``"keys" = [low, high]`` is one dimension.
+
+    Args:
+        table: Keys -> [low, high], as quantities or numbers.
+        cube: Number of samples and seed of the Latin hypercube.
+        problems: List to which errors are added.
+    """
     factors = [Factor(_keys(text), continuous=True) for text in table]
     ranges = []
     for factor, (text, ends) in zip(factors, table.items(), strict=True):

@@ -72,7 +72,7 @@ class MainEffect:
 
 
 def select_measured(rows: Sequence[Row], metric: str) -> list[Row]:
-    """Return the rows in which a metric is a number."""
+    """Return the rows in which a metric is a finite number, in their order."""
     return [row for row in rows if is_number(row.metrics.get(metric, {"value": None})["value"])]
 
 
@@ -88,6 +88,9 @@ def effect_of(factor: Factor, rows: Sequence[Row], metric: str) -> MainEffect:
         factor: Varied factor.
         rows: Points that have the metric.
         metric: Name of the metric.
+
+    Returns:
+        Values of factor and metric, and their rank correlation with its p-value if the factor is a number.
     """
     from scipy.stats import spearmanr
 
@@ -103,7 +106,13 @@ def effect_of(factor: Factor, rows: Sequence[Row], metric: str) -> MainEffect:
 
 
 def rank_parameters(rows: Sequence[Row], metric: str, goal: str) -> list[Row]:
-    """Return the healthy rows in which a metric is a number, the best first; the goal is "minimise" or "maximise"."""
+    """Return the healthy rows in which a metric is a number, the best first.
+
+    Args:
+        rows: Results of the points.
+        metric: Name of the metric.
+        goal: "minimise" or "maximise".
+    """
     from reflowshock.workflow.study.results import HEALTHY
 
     healthy = [row for row in select_measured(rows, metric) if row.verdict == HEALTHY]

@@ -22,7 +22,7 @@ BLUE, RED, GREY = "#0b5fa5", "#d1495b", "#9aa5b1"
 
 
 def write_results(folder: Path, study: Study, rows: Sequence[Row]) -> None:
-    """Write all results of a study.
+    """Write all results of a study: page (HTML), tables (CSV, Parquet) and plots.
 
     Args:
         folder: Folder to write to.

@@ -14,7 +14,15 @@ MARKERS = "sDo^vP"  # in addition to colours, for colour-blind readers
 
 
 def outcomes(study: Study, rows: Sequence[Row]) -> tuple[str, list[Row]]:
-    """Return the first metric of a study whose values are texts, and the points that have it; else "" and []."""
+    """Return the first metric of a study whose values are texts, and the points that have it; else "" and [].
+
+    Args:
+        study: Study with its metrics.
+        rows: Results of the points.
+
+    Returns:
+        Name of the metric, and the points that have it.
+    """
     for name in study.metrics:
         described = [row for row in rows if isinstance(row.metrics.get(name, {"value": None})["value"], str)]
         if described:

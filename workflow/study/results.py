@@ -77,6 +77,9 @@ def columns(rows: Sequence[Row], study: Study) -> dict[str, list[Value]]:
     """Return the results by column; the name ends with the unit in brackets, metrics are in SI units.
 
     Columns on points have names that differ from all metrics, since metrics include ``verdict`` and ``seconds``.
+
+    Returns:
+        Column title -> value of each row, None where it is missing.
     """
     metrics = dict.fromkeys((name, metric["unit"]) for row in rows for name, metric in row.metrics.items())
     table: dict[str, list[Value]] = {"number": [row.number for row in rows], "point": [row.key for row in rows]}
@@ -95,7 +98,14 @@ def columns(rows: Sequence[Row], study: Study) -> dict[str, list[Value]]:
 
 
 def numbers(texts: Sequence[str]) -> tuple[str, list[Value]]:
-    """Return the common unit of quantities and their numbers; without a common unit, an empty unit and the texts."""
+    """Return the common unit of quantities such as "0.8 mm", and their numbers in this unit.
+
+    Args:
+        texts: Values as written in a case file.
+
+    Returns:
+        Unit and numbers; without a common unit, an empty unit and the texts.
+    """
     matches = [match for text in texts if (match := QUANTITY.fullmatch(text)) is not None]
     units = {match["unit"] for match in matches}
     if len(matches) < len(texts) or len(units) != 1:
@@ -107,6 +117,10 @@ def write_csv(path: Path, table: Mapping[str, Sequence[Value]]) -> None:
     """Write columns as CSV with their names in the first line; missing values are empty.
 
     An apostrophe precedes a text that a spreadsheet would evaluate as a formula.
+
+    Args:
+        path: File to write.
+        table: Column title -> values, all of the same length.
     """
     partial = path.with_suffix(".partial")
     with partial.open("w", newline="", encoding="utf-8", errors="backslashreplace") as file:
@@ -121,7 +135,12 @@ def _no_formula(value: Value) -> Value:
 
 
 def write_parquet(path: Path, table: Mapping[str, Sequence[Value]]) -> None:
-    """Write columns as Parquet; missing values are null."""
+    """Write columns as Parquet; missing values are null.
+
+    Args:
+        path: File to write.
+        table: Column title -> values, all of the same length.
+    """
     import pyarrow
     from pyarrow import parquet
 

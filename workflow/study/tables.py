@@ -12,7 +12,15 @@ UNSOUND = "{} of {} points failed a check; they count in the means."
 
 
 def ranking(study: Study, rows: Sequence[Row]) -> dict:
-    """Return the table of healthy points, the best first; of keys that vary together only the first is listed."""
+    """Return the table of healthy points, the best first; of keys that vary together only the first is listed.
+
+    Args:
+        study: Study with its factors, metrics and goal.
+        rows: Results of the points.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text).
+    """
     metrics = study.metrics
     keys = [factor.keys[0] for factor in study.design.factors]
     head = ["rank", "point", *_short(keys), *(name.replace("_", " ") for name in metrics)]
@@ -31,7 +39,15 @@ def ranking(study: Study, rows: Sequence[Row]) -> dict:
 
 
 def effects(study: Study, rows: Sequence[Row]) -> list[tuple[str, str, list[MainEffect]]]:
-    """Return metric, unit and the main effect of every factor, for each metric that the points have."""
+    """Return metric, unit and the main effect of every factor, for each metric that the points have.
+
+    Args:
+        study: Study with its factors and metrics.
+        rows: Results of the points.
+
+    Returns:
+        One item per metric: its name, its SI unit, and the main effect of each factor.
+    """
     return [
         (name, numeric[0].metrics[name]["unit"], [effect_of(factor, numeric, name) for factor in study.design.factors])
         for name in study.metrics
@@ -40,7 +56,14 @@ def effects(study: Study, rows: Sequence[Row]) -> list[tuple[str, str, list[Main
 
 
 def effect_table(effects: Sequence[tuple[str, str, Sequence[MainEffect]]]) -> dict:
-    """Return the table of main effects, for each metric the largest first."""
+    """Return the table of main effects, for each metric the largest first.
+
+    Args:
+        effects: Metric, its unit and its main effects, see ``effects``.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text).
+    """
     return {
         "head": ["factor", "metric", "effect", "rank correlation", "p-value"],
         "rows": [
@@ -58,14 +81,25 @@ def effect_table(effects: Sequence[tuple[str, str, Sequence[MainEffect]]]) -> di
 
 
 def imbalance(rows: Sequence[Row]) -> str:
-    """Return a warning if points without a result or with failed checks bias the means; empty otherwise."""
+    """Return a warning if points without a result or with failed checks bias the means; empty otherwise.
+
+    Args:
+        rows: Results of the points.
+    """
     missing, unsound = sum(not row.metrics for row in rows), sum(row.verdict == UNHEALTHY for row in rows)
     remarks = [text.format(count, len(rows)) for text, count in ((MIXED, missing), (UNSOUND, unsound)) if count]
     return " ".join(remarks)
 
 
 def troubles(rows: Sequence[Row]) -> dict:
-    """Return the table of failed, impossible and unhealthy points."""
+    """Return the table of failed, impossible and unhealthy points.
+
+    Args:
+        rows: Results of the points.
+
+    Returns:
+        Table with ``head`` (column titles) and ``rows`` (lists of text) and ``prose``.
+    """
     return {
         "head": ["settings", "point", "result", "reason"],
         "prose": True,
