@@ -269,12 +269,22 @@ NAMES = tuple(dict.fromkeys(kind.name for kind in KINDS))
 
 
 def kind_of(case: Case) -> Kind:
-    """Return the kind of a case."""
+    """Return the kind of a case.
+
+    Returns:
+        Record with models, stages, forecast and report functions of this kind of case.
+    """
     return next(kind for kind in KINDS if kind.case is type(case))
 
 
 def kind_named_in(table: Mapping) -> Kind:
-    """Return the kind of a case file.
+    """Return the kind of a case file, by its table that names a kind.
+
+    Args:
+        table: Content of the case file.
+
+    Returns:
+        Record with models, stages, forecast and report functions of this kind of case.
 
     Raises:
         CaseError: The file has the table of no kind, or of several.
@@ -295,11 +305,19 @@ def kind_named_in(table: Mapping) -> Kind:
 
 
 def stage_seconds(case: Case) -> dict[str, float]:
-    """Predict the wall time [s] of each stage."""
+    """Return the predicted wall time [s] of each stage of a case, by name, the report included."""
     return every_stage(case, kind_of(case).forecast(case).seconds)
 
 
 def every_stage(case: Case, predicted: Mapping[str, float]) -> dict[str, float]:
-    """Complete predicted wall times [s] with default values of the short stages."""
+    """Complete predicted wall times with default values of the short stages.
+
+    Args:
+        case: Case, whose pipeline gives the stages.
+        predicted: Name of a stage -> predicted wall time [s].
+
+    Returns:
+        Name of each stage, in order -> wall time [s].
+    """
     usual = dict.fromkeys(case.pipeline.names, SECONDS_OF_STAGE) | {case.pipeline.names[-1]: SECONDS_OF_REPORT}
     return usual | dict(predicted)

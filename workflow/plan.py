@@ -53,6 +53,10 @@ def plan_record(store: Store, point: Point) -> dict[str, Any]:
     Args:
         store: Store of the run folder, whose files are examined.
         point: Point of the run.
+
+    Returns:
+        ``case`` (name), ``folder``, ``stages`` (``runs``, ``why``, ``seconds`` by name), ``effects``, ``compilation``
+        [s] and ``seconds`` of all.
     """
     stages = planned_stages(store, point)
     once = compilation_time([name for name, stage in stages.items() if stage.runs])

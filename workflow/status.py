@@ -74,7 +74,7 @@ def _progress(store: Store, point: Point, stage: str) -> str:
 
 
 def show_status(store: Store, point: Point, console: Console) -> None:
-    """Print state, wall time and main figures of each stage."""
+    """Print state, wall time and main figures of each stage of a run; nothing is changed."""
     table = Table(title=f"{point.case.case.name} in {store.folder}", title_justify="left", expand=True)
     table.add_column("stage", no_wrap=True)
     table.add_column("state", no_wrap=True)

@@ -71,7 +71,11 @@ def write(runs: Sequence[ComparedRun], path: Path) -> None:
 
 
 def histories(runs: Sequence[ComparedRun]) -> list[Chart]:
-    """Return charts of common histories: board centre, critical joint of the first run, watch points."""
+    """Return charts of common histories: board centre, critical joint of the first run, watch points.
+
+    Returns:
+        Interactive charts for the report page.
+    """
     from reflowshock.fem.output.ranking import PEEL, critical_joint
     from reflowshock.workflow.report.histories import joint_stress
 

@@ -34,7 +34,12 @@ def read_case_accuracy(run_folder: Path, case: Case) -> Accuracy | None:
 
 
 def is_current(accuracy: Accuracy, case: Case) -> bool:
-    """Return whether a study was run with the present inputs of a case and this version of the program."""
+    """Return whether a study was run with the present inputs of a case and this version of the program.
+
+    Args:
+        accuracy: Study, whose key identifies the inputs.
+        case: Case as it is now.
+    """
     return accuracy.key in product_keys(case).values()
 
 

@@ -46,7 +46,11 @@ Settings = dict[str, str]
 
 
 def package_study(case: PackageCase) -> ConvergenceStudy:
-    """Return the study of a package without a drop: the particle spacing of its joints."""
+    """Return the study of a package without a drop: the particle spacing of its joints.
+
+    Returns:
+        Varied parameters, further runs, and the function that measures their errors.
+    """
     errors = {"joint_width_error_max": "largest width, worst joint"}
     return ConvergenceStudy(
         "reflow", ("reflow",), errors, _widths, (_particles(case, {}, (*SPACINGS, FINEST_SPACING)),)
@@ -60,6 +64,9 @@ def board_drop_study(case: BoardDropCase) -> ConvergenceStudy:
     take small explicit steps everywhere, so two models vary the meshes. If there are few joints all are fine: coarse
     joints are tied to boxes, which become softer as they are refined. Where masses are scaled to a time step, the step
     is proportional to the element size.
+
+    Returns:
+        Varied parameters, further runs, and the function that measures their errors.
     """
     linear = _is_linear(case)
     whole = _one_model(case) if linear else _mostly_fine(case)

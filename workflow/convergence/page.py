@@ -110,7 +110,11 @@ def _markdown(table: dict) -> str:
 
 
 def charts(accuracy: Accuracy) -> list[Chart]:
-    """Return charts of the judged error over wall time and over core-seconds, with run names as labels."""
+    """Return charts of the judged error over wall time and over core-seconds, with run names as labels.
+
+    Returns:
+        Interactive charts for the report page.
+    """
     level = Axis("error [%]", log=True)
     return [
         Chart(Axis(label, log=True), level, _series(accuracy, cost))

@@ -63,6 +63,9 @@ def drop_study(case: DropCase) -> ConvergenceStudy:
     """Return the study of a drop: particles per edge of the initial cube, symmetry, schemes and time steps.
 
     A drop with inertia costs more: its schemes have a few coarse runs with the settings of the case.
+
+    Returns:
+        Varied parameters, further runs, and the function that measures their errors.
     """
     drop, errors = case.drop, {"shape_error": SHAPE["shape_error"], "height_error": "height", **SHAPE}
     exact = "sphere" if drop.is_free else "Young-Laplace"
@@ -144,7 +147,11 @@ def _per_edge(case: DropCase, count: int) -> dict[str, str]:
 
 
 def joint_study(case: JointCase) -> ConvergenceStudy:
-    """Return the study of a joint: particle spacings around the one of the case."""
+    """Return the study of a joint: particle spacings around the one of the case.
+
+    Returns:
+        Varied parameters, further runs, and the function that measures their errors.
+    """
     lifted = case.joint.package is not None and "lift" in case.joint.package.free
     errors = SHAPE | ({"collapse_height_error": "standoff"} if lifted else {"axial_force_error": "axial force"})
     parameter = _spacing("joint.spacing", case.joint.spacing, _scheme(case))
@@ -152,7 +159,11 @@ def joint_study(case: JointCase) -> ConvergenceStudy:
 
 
 def drops_study(case: DropsCase) -> ConvergenceStudy:
-    """Return the study of two drops: particle spacings around the one of the case."""
+    """Return the study of two drops: particle spacings around the one of the case.
+
+    Returns:
+        Varied parameters, further runs, and the function that measures their errors.
+    """
     errors = {"max_width_error": "largest width", "height_error": "height"}
     exact = "sphere" if case.drops.is_free else "Young-Laplace"
     parameter = _spacing("drops.spacing", case.drops.spacing, _scheme(case), FINENESS[1:])
@@ -173,6 +184,9 @@ def oscillation_study(_case: OscillationCase) -> ConvergenceStudy:
     """Return the study of an oscillating drop: particles along the radius with proportional steps, and the time step.
 
     The reference is exact for small amplitudes. Larger ones have a longer period: errors converge to that difference.
+
+    Returns:
+        Varied parameters, further runs, and the function that measures their errors.
     """
     errors = {"period_error": "period", "decay_rate_error": "decay rate"}
 

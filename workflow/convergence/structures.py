@@ -48,7 +48,11 @@ Settings = dict[str, str]
 
 
 def structure_study(case: StructureCase) -> ConvergenceStudy:
-    """Return the study of a structure: element size, time step, and the solvers and schemes that the case supports."""
+    """Return the study of a structure: element size, time step, and the solvers and schemes that the case supports.
+
+    Returns:
+        Varied parameters, further runs, and the function that measures their errors.
+    """
     errors, measure = _judged_quantities(case)
     solver = _single_solver(case)
     steps, smallest = _steps(case, solver)

@@ -80,7 +80,7 @@ def write_case(path: Path, component: str, name: str | None, lengths: dict[str, 
         path: File or folder of the board.
         component: Reference of the component.
         name: Name of the case; None for one made of file and component.
-        lengths: Values of the options "thickness", "ball" and "holes" as the user typed them; None if not given.
+        lengths: Options "--thickness", "--ball" and "--holes" -> value as the user typed it; None if not given.
 
     Returns:
         Path of the case file.

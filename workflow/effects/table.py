@@ -23,7 +23,7 @@ MEASURED = Path(__file__).with_name("costs.json")  # written by benchmarks/effec
 
 @cache
 def read_measured_ratios() -> dict[str, float]:
-    """Return measured ratios of the processor time per step with and without an effect, by effect."""
+    """Return, by effect name, the measured processor time per step with the effect over the one without it."""
     return {name: item["ratio"] for name, item in json.loads(MEASURED.read_text(encoding="utf-8"))["effects"].items()}
 
 

@@ -17,6 +17,9 @@ def flow_study(flow: FlowKind, case: FlowCase) -> ConvergenceStudy:
     Args:
         flow: Kind of flow.
         case: Case of this kind; further parameters are varied with the coarsest number of particles.
+
+    Returns:
+        Varied parameters, further runs, and the function that measures their errors.
     """
     numerics, measures = f"{case.kind}.numerics", flow.measures(case.scene)
 

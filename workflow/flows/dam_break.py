@@ -68,7 +68,15 @@ def _solve(scene: DamBreak, _folder: Path, progress: Callable[[float], None], ch
 
 
 def dam_curves(dam: DamBreak, result: "FlowResult") -> "list[Chart]":
-    """Return charts of sensor pressure, front and energies, scaled by the height H of the column."""
+    """Return charts of sensor pressure, front and energies, scaled by the height H of the column.
+
+    Args:
+        dam: Parameters of the flow, the scene of the case.
+        result: Result of the flow: snapshots, history (name -> samples, time in s) and metrics.
+
+    Returns:
+        Interactive charts for the report page.
+    """
     from reflowshock.particles.reference.dam_break import measured_pressure
     from reflowshock.workflow.report.charts import Axis, Chart, Series
     from reflowshock.workflow.report.colours import ORANGE, RED

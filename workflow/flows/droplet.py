@@ -145,7 +145,15 @@ def _limits(scene: Droplet) -> dict[str, float]:
 
 
 def droplet_curves(drop: Droplet, result: "FlowResult") -> "list[Chart]":
-    """Return charts of the shape with the cap at rest, of the pressure or the speed, and of the energies."""
+    """Return charts of the shape with the cap at rest, of the pressure or the speed, and of the energies.
+
+    Args:
+        drop: Parameters of the flow, the scene of the case.
+        result: Result of the flow: snapshots, history (name -> samples, time in s) and metrics.
+
+    Returns:
+        Interactive charts for the report page.
+    """
     from reflowshock.workflow.report.charts import Axis, Chart, Series
     from reflowshock.workflow.report.colours import ORANGE, RED
 

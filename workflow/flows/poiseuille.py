@@ -48,7 +48,15 @@ def _solve(
 
 
 def channel_curves(scene: Poiseuille, result: "FlowResult") -> "list[Chart]":
-    """Return charts of the final velocity profile next to the exact one, and of the largest speed over time."""
+    """Return charts of the final velocity profile next to the exact one, and of the largest speed over time.
+
+    Args:
+        scene: Parameters of the flow, the scene of the case.
+        result: Result of the flow: snapshots, history (name -> samples, time in s) and metrics.
+
+    Returns:
+        Interactive charts for the report page.
+    """
     from reflowshock.particles.flows.channel import exact_speeds
     from reflowshock.workflow.report.charts import Axis, Chart, Series
     from reflowshock.workflow.report.colours import BLUE, RED

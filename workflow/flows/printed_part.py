@@ -56,6 +56,9 @@ def part_scene(stl: Path) -> Scene:
 
     Args:
         stl: STL file of the surface, in millimetres.
+
+    Returns:
+        Interactive 3D scene for the report page.
     """
     mesh = meshio.read(stl)
     points, vertex = np.unique(1e-3 * mesh.points, axis=0, return_inverse=True)
@@ -70,7 +73,7 @@ def layer_table(file: Path) -> dict:
     """Return the table of layers; each row describes the part after that layer.
 
     Args:
-        file: File with the layers, written by the stage.
+        file: CSV file ``layers.csv`` of the stage.
 
     Returns:
         Table with ``head`` (column titles) and ``rows`` (lists of text).

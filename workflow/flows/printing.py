@@ -104,7 +104,15 @@ def _solve(scene: Printing, folder: Path, progress: Callable[[float], None], che
 
 
 def printing_curves(scene: Printing, result: "FlowResult") -> "list[Chart]":
-    """Return charts of the height of the part and of the energies of the liquid over the number of drops."""
+    """Return charts of the height of the part and of the energies of the liquid over the number of drops.
+
+    Args:
+        scene: Parameters of the flow, the scene of the case.
+        result: Result of the flow: snapshots, history (name -> samples, time in s) and metrics.
+
+    Returns:
+        Interactive charts for the report page.
+    """
     from reflowshock.workflow.report.charts import Axis, Chart, Series
     from reflowshock.workflow.report.colours import ORANGE
 

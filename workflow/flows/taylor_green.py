@@ -51,7 +51,14 @@ def _solve(
 
 
 def vortex_curves(_scene: TaylorGreen, result: "FlowResult") -> "list[Chart]":
-    """Return charts of the largest speed next to the exact one, and of the kinetic energy."""
+    """Return charts of the largest speed next to the exact one, and of the kinetic energy.
+
+    Args:
+        result: Result of the flow: snapshots, history (name -> samples, time in s) and metrics.
+
+    Returns:
+        Interactive charts for the report page.
+    """
     from reflowshock.workflow.report.charts import Axis, Chart, Series
     from reflowshock.workflow.report.colours import RED
 

@@ -34,6 +34,9 @@ def shapes_scene(run_folder: Path, joints: Sequence[Mapping[str, Any]]) -> Scene
     Args:
         run_folder: Folder of the run; without closed surfaces the shapes of the reflow are shown.
         joints: Records of the joints, see ``joint_records``.
+
+    Returns:
+        Interactive 3D scene for the report page.
     """
     kinds: dict[str, list[Group]] = {}
     limit = 0.0

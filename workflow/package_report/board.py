@@ -75,6 +75,9 @@ def watch_curves(case: BoardDropCase, histories: Histories) -> list[Chart]:
     Args:
         case: Case with the watch points.
         histories: Mode -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity.
+
+    Returns:
+        Interactive charts for the report page.
     """
     from reflowshock.fem.loads.shock_pulse import shock_pulse
     from reflowshock.fem.output.acceleration import drop_accelerations

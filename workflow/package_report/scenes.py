@@ -28,6 +28,9 @@ def drop_scene(folder: Path, history: Arrays, result: Mapping[str, Any]) -> tupl
         folder: Folder of the mode, whose field files are read.
         history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity.
         result: Content of ``result.json`` of the mode.
+
+    Returns:
+        Interactive 3D scene for the report page, one frame per stored time, and its caption.
     """
     stress = VON_MISES.worse(history)
     critical = stress[:, critical_joint(history)]
@@ -48,6 +51,9 @@ def residual_scene(path: Path, parts: Sequence[str], top: float) -> Scene:
         path: Field file ``residual.vtu``.
         parts: Names of the parts of the mesh, in the order of their numbers in the file.
         top: Largest stress of the colour scale [Pa].
+
+    Returns:
+        Interactive 3D scene for the report page.
     """
     import meshio
 

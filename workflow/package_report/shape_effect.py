@@ -71,6 +71,9 @@ def curves(real: Arrays, identical: Arrays) -> list[Chart]:
         real: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity, of
             the shock with real joints.
         identical: The same arrays of the shock with identical joints.
+
+    Returns:
+        Interactive charts for the report page.
     """
     peaks, identical_peaks = peel_peaks(real), peel_peaks(identical)
     critical, names = next(iter(peaks)), list(peaks)[:MOST_JOINTS]

@@ -88,6 +88,9 @@ def warpage_scene(structure: Mapping[str, NDArray], joints: Sequence[Mapping[str
         structure: Arrays of ``reflow/structure.npz`` (``points``, ``displacement``, ``package``, ``temperature``,
             ``pad_motion``, …).
         joints: Records with ``x``, ``y`` [m] and, optionally, ``name``.
+
+    Returns:
+        Interactive 3D scene for the report page.
     """
     warped = faces(structure)
     largest = max(float(np.abs(face.over_centre).max()) for face in warped)
@@ -118,6 +121,9 @@ def profiles(structure: Mapping[str, NDArray]) -> list[Chart]:
     Args:
         structure: Arrays of ``reflow/structure.npz`` (``points``, ``displacement``, ``package``, ``temperature``,
             ``pad_motion``, …).
+
+    Returns:
+        Interactive charts for the report page.
     """
     package, board = faces(structure)
     x, y, along = _diagonal(package)

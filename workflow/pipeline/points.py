@@ -71,10 +71,10 @@ def overrides(settings: Mapping[str, str]) -> list[str]:
 
 
 def settings_text(settings: Mapping[str, str]) -> str:
-    """Return settings as readable text, separated by commas.
+    """Return settings as readable text, "key = value" separated by commas.
 
     Args:
-        settings: Dotted key -> value as text.
+        settings: Dotted key -> value as text; empty for the case as it is.
     """
     return ", ".join(f"{key} = {value}" for key, value in settings.items()) or "the case as it is"
 

@@ -123,7 +123,12 @@ def collect_summary(run_folder: Path, case: Case) -> dict:
 
 
 def write_summary(folder: Path, summary: dict) -> None:
-    """Write ``summary.json`` into a folder atomically."""
+    """Write ``summary.json`` into a folder atomically.
+
+    Args:
+        folder: Folder of the file.
+        summary: Content, see ``collect_summary``.
+    """
     partial = folder / ".summary.json.partial"
     partial.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     partial.rename(folder / "summary.json")

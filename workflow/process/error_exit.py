@@ -159,6 +159,9 @@ def one_line_errors() -> Iterator[None]:
 def run_app(app: Callable[..., Any]) -> None:
     """Run a Typer application; usage errors are reported in one line with exit code 2.
 
+    Args:
+        app: Typer application, which reads ``sys.argv``.
+
     Raises:
         SystemExit: Always, with the exit code, unless a command raises.
         BaseException: Any exception of the commands.

@@ -73,5 +73,9 @@ def round_down(factor: float) -> float:
 
 
 def milliseconds(times: Floats) -> list[str]:
-    """Return times [s] as labels of frames."""
+    """Return times as labels of frames, in milliseconds.
+
+    Args:
+        times: Times, shape (k,) [s].
+    """
     return [f"{1e3 * time:.4g} ms" for time in times]

@@ -30,6 +30,9 @@ def history_curves(histories: Histories, critical_joint: str) -> list[Chart]:
     Args:
         histories: Mode -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity.
         critical_joint: Name of the joint whose stress is drawn.
+
+    Returns:
+        Interactive charts for the report page.
     """
     quantities = (
         ("board centre, relative to table [mm]", lambda history: history["board_centre"][:, 2] / MILLI),
@@ -58,6 +61,9 @@ def difference_curves(histories: Histories, critical_joint: str) -> list[Chart]:
     Args:
         histories: Mode -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity.
         critical_joint: Name of the joint whose stress is drawn.
+
+    Returns:
+        Interactive charts for the report page.
     """
     if len(histories) < 2:
         return []
@@ -82,6 +88,9 @@ def energy_curves(history: Mapping[str, NDArray]) -> list[Chart]:
     Args:
         history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity;
             energies in J.
+
+    Returns:
+        Interactive charts for the report page.
     """
     time = _time(history)
     terms = [

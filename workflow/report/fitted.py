@@ -45,7 +45,11 @@ def gauge_table(gauges: "Mapping[str, StrainGauge]", metrics: Mapping[str, Any],
 
 
 def in_mm(position: tuple[float, ...]) -> str:
-    """Return a position [m] as text in millimetres."""
+    """Return a position as text in millimetres, coordinates separated by commas.
+
+    Args:
+        position: Coordinates [m].
+    """
     return ", ".join(number(value / MILLI) for value in position)
 
 
@@ -56,6 +60,9 @@ def gauge_curves(histories: Histories, gauges: "Mapping[str, StrainGauge]", styl
         histories: Mode or solver -> arrays of its ``history.npz``, with ``time`` and ``gauge@<name>``, both shape (k,).
         gauges: Gauges by name.
         styles: Mode or solver -> attributes of its line: name, colour, line style.
+
+    Returns:
+        Interactive charts for the report page.
     """
     return [
         Chart(

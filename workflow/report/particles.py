@@ -20,6 +20,9 @@ def particle_scene(shape: "JointShape") -> Scene:
 
     Args:
         shape: Result of a reflow: particles, free surface and history of one solder body.
+
+    Returns:
+        Interactive 3D scene for the report page.
     """
     states = [*((state.points, state.triangles) for state in shape.snapshots[:-1]), (shape.points, shape.triangles)]
     frames = [f"{1e3 * state.time:.4g} ms" for state in shape.snapshots[:-1]] + ["end"]

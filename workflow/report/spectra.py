@@ -26,6 +26,9 @@ def spectrum_curves(pulses: "Mapping[str, Pulse]", duration: float) -> list[Char
     Args:
         pulses: Name -> input acceleration.
         duration: Duration of the run [s].
+
+    Returns:
+        Interactive charts for the report page.
     """
     from reflowshock.fem.output.response_spectrum import QUALITY, spectrum_frequencies
 

@@ -40,7 +40,11 @@ def write_page(path: Path, template: str, context: dict) -> None:
 
 
 def template_environment(folder: Path) -> jinja2.Environment:
-    """Return the environment of the templates of a folder, which escapes texts and shows control characters."""
+    """Return the environment of the templates of a folder, which escapes texts and shows control characters.
+
+    Args:
+        folder: Folder of the template files, which is read.
+    """
     return jinja2.Environment(
         loader=jinja2.FileSystemLoader(folder),
         autoescape=True,

@@ -32,7 +32,7 @@ def add_solder(run_folder: Path, case: SolderCase, context: dict, summary: dict)
     Args:
         run_folder: Run folder with the products.
         case: Case of the run.
-        context: Context of the page's template, changed in place.
+        context: Context of the page's template, changed in place: ``headline``, ``tables``, ``curves``, ``scenes``.
         summary: Content of ``summary.json``.
     """
     shape, meridian = _add_body(run_folder, context, summary)
@@ -47,7 +47,13 @@ def add_solder(run_folder: Path, case: SolderCase, context: dict, summary: dict)
 
 
 def add_oscillation(run_folder: Path, _case: OscillationCase, context: dict, summary: dict) -> None:
-    """Add the section of an oscillating drop to the context of the report; arguments as in `add_solder`."""
+    """Add the section of an oscillating drop to the context of the report; arguments as in `add_solder`.
+
+    Args:
+        run_folder: Run folder with the products.
+        context: Context of the page's template, changed in place.
+        summary: Content of ``summary.json``.
+    """
     shape, _ = _add_body(run_folder, context, summary)
     context["curves"]["swing"] = oscillation_curve(shape.history, summary["metrics"])
 
@@ -79,6 +85,9 @@ def profile_curve(points: np.ndarray, meridian: np.ndarray | None, is_plane: boo
         points: Surface particles around the z axis, shape (s, 3) [m].
         meridian: Radius and height of the exact meridian, shape (2, k) [m]; None if it is unknown.
         is_plane: Whether the body is the same along y; the radius is then the distance from the plane x = 0.
+
+    Returns:
+        Interactive charts for the report page.
     """
     order, sideways = np.argsort(points[:, 2]), 0.0 if is_plane else 1.0
     radius, height = np.hypot(points[:, 0], sideways * points[:, 1])[order] / MILLI, points[order, 2] / MILLI
@@ -97,6 +106,9 @@ def history_curve(history: Mapping[str, np.ndarray], moves: bool) -> list[Chart]
         history: Arrays of shape (k,) by name: ``time`` [s], ``step``, ``height``, ``width`` [m], ``energy`` [J],
             ``capillary_number``, ``time_step`` [s] and, for a pull, ``pull`` [N].
         moves: Whether the liquid has inertia. Without it, the charts are over steps, since times have no meaning.
+
+    Returns:
+        Interactive charts for the report page.
     """
     axis, x = (TIME, history["time"] / MILLI) if moves else (Axis("step"), history["step"])
     sizes = [
@@ -141,6 +153,9 @@ def path_curve(positions: Sequence[Mapping]) -> list[Chart]:
         positions: Records of the joint at each position of the package: ``standoff``, ``offset`` [m], ``tilt`` [rad],
             ``axial_force``, ``axial_force_exact`` [N], ``waist``, ``max_width`` [m]; None where unknown. The x axis is
             the first of standoff, offset and tilt that varies.
+
+    Returns:
+        Interactive charts for the report page.
     """
     axis_of = {"standoff": ("standoff [mm]", MILLI), "offset": ("offset [mm]", MILLI), "tilt": ("tilt [deg]", DEGREE)}
     name = next((name for name in axis_of if positions[0][name] != positions[-1][name]), "standoff")
@@ -170,6 +185,9 @@ def oscillation_curve(history: Mapping[str, np.ndarray], metrics: Mapping[str, d
     Args:
         history: Arrays of shape (k,) by name: ``time`` [s], ``amplitude`` over the radius, energies [J].
         metrics: Name -> record with ``value`` (SI) and ``unit``: period and decay rate with their errors.
+
+    Returns:
+        Interactive charts for the report page.
     """
     time, value = history["time"], {name: metric["value"] for name, metric in metrics.items()}
     period = value["period"] / (1.0 + value["period_error"])

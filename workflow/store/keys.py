@@ -33,6 +33,9 @@ def product_keys(case: Case) -> dict[str, str]:
 
     A key is a digest of the parameters of the stage and of all upstream stages, and of the program version. The names
     of case and scale enter only the key of the report.
+
+    Returns:
+        Name of each stage -> key, hexadecimal digits.
     """
     keys: dict[str, str] = {}
     for stage in case.pipeline.stages:
@@ -62,7 +65,11 @@ def inputs_digest(case: Case) -> str:
 
 
 def digest_of(content: dict) -> str:
-    """Return the SHA-256 of a table, independent of the order of its keys."""
+    """Return the SHA-256 of a table as hexadecimal text, independent of the order of its keys.
+
+    Args:
+        content: JSON data.
+    """
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 

@@ -26,11 +26,11 @@ def seal(folder: Path, record: dict) -> dict:
     """Write the record of a complete product and flush all its files to disk.
 
     Args:
-        folder: Folder of the product.
-        record: Results of the stage, without ``files``.
+        folder: Folder of the product, into which ``stage.json`` is written.
+        record: Results of the stage, see ``run_stage``, without ``files``.
 
     Returns:
-        The record with ``files`` and the digest of the record itself.
+        The record with ``files`` (file name -> SHA-256) and the digest of the record itself.
     """
     files = {path.relative_to(folder).as_posix(): file_digest(path) for path in _files(folder)}
     sealed = json.loads(json.dumps(record | {"files": files}))  # the same types as after reading
@@ -83,7 +83,11 @@ def read_record(product: Path) -> dict | None:
 
 
 def damage(product: Path) -> tuple[str, ...]:
-    """List the damaged or missing files of a product as messages; empty if all files are intact."""
+    """List the damaged or missing files of a product as messages; empty if all files are intact.
+
+    Args:
+        product: Folder of the product; all its files are read.
+    """
     record = read_record(product)
     if record is None:
         return (f"{RECORD} {'was modified' if (product / RECORD).exists() else 'is missing'}",)

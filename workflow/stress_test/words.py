@@ -12,7 +12,11 @@ from reflowshock.workflow.stress_test.sample import MOST_REFUSED, Sample
 
 
 def show_verdict(verdict: Verdict) -> None:
-    """Print one verdict: case, closest bound, measured value, margin."""
+    """Print one verdict: case, closest bound, measured value, margin.
+
+    Args:
+        verdict: Result of one hard case: checks with bound and measured value, or a message.
+    """
     line = style_text(" {}  {}  {} s", name_case(verdict), str(verdict), f"{verdict.seconds:.1f}")
     console.print(_mark(verdict.ok) + line, soft_wrap=True)
 
@@ -22,12 +26,20 @@ def _mark(ok: bool) -> Text:
 
 
 def name_case(verdict: Verdict) -> str:
-    """Return the name of a case with its varied values."""
+    """Return the name of a case with its varied values.
+
+    Args:
+        verdict: Result of one hard case.
+    """
     return verdict.case.name + (f" ({verdict.case.tried})" if verdict.case.tried else "")
 
 
 def show_sample(sample: Sample) -> None:
-    """Print the results of the random cases of a trial and its missed cases."""
+    """Print the results of the random cases of a trial and its missed cases.
+
+    Args:
+        sample: Random cases of one file, with their results.
+    """
     seconds = f"{sum(verdict.seconds for verdict in sample.verdicts):.1f}"
     line = style_text(" {}  {}  {} s", sample.name, sample_summary(sample), seconds)
     console.print(_mark(sample.ok) + line, soft_wrap=True)
@@ -36,7 +48,11 @@ def show_sample(sample: Sample) -> None:
 
 
 def sample_summary(sample: Sample) -> str:
-    """Return a summary of the random cases of a trial."""
+    """Return a summary of the random cases of a trial as one line: numbers of cases, misses and refusals.
+
+    Args:
+        sample: Random cases of one file, with their results.
+    """
     counts = f"{len(sample.verdicts)} tried, {sample.refused} refused, {len(sample.missed)} missed"
     if sample.too_many_refused:
         counts += f"; allowed to be refused: {MOST_REFUSED:.0%}"
@@ -44,7 +60,12 @@ def sample_summary(sample: Sample) -> str:
 
 
 def show_table(verdicts: Sequence[Verdict], samples: Sequence[Sample]) -> None:
-    """Print tried and missed cases and the smallest margin per family, then samples with too many refusals."""
+    """Print a table of tried and missed cases and the smallest margin per family, then samples with too many refusals.
+
+    Args:
+        verdicts: Results of the fixed cases.
+        samples: Random cases of each file, with their results.
+    """
     table = Table(box=None, header_style="bold")
     for column in ("family", "fixed", "random", "missed", "smallest margin", "of"):
         table.add_column(column, justify="left" if column in ("family", "of") else "right")

@@ -126,6 +126,9 @@ def with_errors(measured: dict[str, float], exact: dict[str, float]) -> dict[str
     Args:
         measured: Measured values by name.
         exact: Exact values by the same names.
+
+    Returns:
+        Name -> measured value, ``<name>_exact`` -> exact value, ``<name>_error`` -> relative error.
     """
     errors = {f"{name}_error": value / exact[name] - 1.0 for name, value in measured.items()}
     return measured | {f"{name}_exact": value for name, value in exact.items()} | errors

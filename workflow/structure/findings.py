@@ -95,7 +95,14 @@ def of_comparison(case: StructureCase, folders: Mapping[str, Path]) -> Findings:
 
 
 def two_scale_errors(differences: Mapping[str, float]) -> dict[str, float]:
-    """Rename differences from a DNS, such as ``strain_difference``, to ``two_scale_strain_error``; values stay."""
+    """Rename differences from a DNS, such as ``strain_difference``, to ``two_scale_strain_error``; values stay.
+
+    Args:
+        differences: Name, such as "displacement_difference" -> relative L2 difference of a history.
+
+    Returns:
+        Name, such as "two_scale_displacement_error" -> the same value.
+    """
     return {f"two_scale_{name.replace('_difference', '_error')}": value for name, value in differences.items()}
 
 

@@ -22,6 +22,9 @@ def acceleration_curves(case: StructureCase, histories: Histories, styles: Mappi
         case: Case with watch points, loads and records.
         histories: Solver -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity.
         styles: Solver -> attributes of its line: name, colour, line style.
+
+    Returns:
+        Interactive charts for the report page.
     """
     from reflowshock.fem.loads.structure_pulses import pulses_of
     from reflowshock.fem.output.acceleration import watch_accelerations
@@ -46,7 +49,11 @@ def acceleration_curves(case: StructureCase, histories: Histories, styles: Mappi
 
 
 def input_spectra(case: StructureCase) -> list[Chart]:
-    """Return a chart of the shock response spectra of all input accelerations of a run; empty without inputs."""
+    """Return a chart of the shock response spectra of all input accelerations of a run; empty without inputs.
+
+    Returns:
+        Interactive charts for the report page.
+    """
     from reflowshock.fem.loads.structure_pulses import pulses_of
 
     inputs = {name: load for name, load in case.loads.items() if load.is_base_excitation}

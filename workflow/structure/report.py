@@ -256,6 +256,9 @@ def point_curves(histories: Histories, point: str) -> list[Chart]:
     Args:
         histories: Solver -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity.
         point: Name of the watch point.
+
+    Returns:
+        Interactive charts for the report page.
     """
     return [component_chart(histories, name, point) for name in ("displacement", "velocity", "strain", "stress")]
 
@@ -266,6 +269,9 @@ def reaction_curves(histories: Histories, supports: list[str]) -> list[Chart]:
     Args:
         histories: Solver -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity.
         supports: Names of the supports.
+
+    Returns:
+        Interactive charts for the report page.
     """
     return [component_chart(histories, "reaction", support, support) for support in supports]
 
@@ -276,6 +282,9 @@ def energy_curves(histories: Histories) -> list[Chart]:
     Args:
         histories: Solver -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity;
             energies in J.
+
+    Returns:
+        Interactive charts for the report page.
     """
     charts = []
     for solver, history in histories.items():

@@ -20,6 +20,9 @@ def deformation_scene(models: Sequence[Path], parts: Sequence[str], time: float)
         models: PVD files of the models, one for each.
         parts: Names of the layers, in the order of their numbers in the files.
         time: Time of the frame that is shown first [s].
+
+    Returns:
+        Interactive 3D scene for the report page.
     """
     series = FieldSeries.read(models, ("part", "von_mises"), time)
     groups = _layers(series, parts, {STRESS: series.fields["von_mises"] / MEGA})
@@ -44,6 +47,9 @@ def modes_scene(path: Path, parts: Sequence[str], modes: Sequence[Mapping]) -> S
         path: PVD file of the modes.
         parts: Names of the layers, in the order of their numbers in the file.
         modes: Records with ``mode`` (number) and ``frequency`` [Hz], see ``read_modes``.
+
+    Returns:
+        Interactive 3D scene for the report page.
     """
     series = FieldSeries.read([path], ("part",))
     size = float(np.linalg.norm(series.displacement, axis=2).max()) or 1.0

@@ -171,7 +171,7 @@ def results(points: Points, store: Store, failed: dict[str, str]) -> list[Row]:
 
 
 def warn_of_metrics(points: Points, store: Store, first: Point) -> None:
-    """Warn of metrics of a study that the first complete point lacks, so that the user can stop early."""
+    """Print a warning of metrics of a study that the first complete point lacks, so that the user can stop early."""
     show_products(store, first)
     row = row_of(1, store, first, points.study.design.keys, None)
     available = _metrics_of(points.study, [row])
@@ -215,7 +215,13 @@ def _required_type(study: Study, name: str) -> str:
 
 
 def show_results(study: Study, rows: Sequence[Row], folder: Path) -> None:
-    """Print the best points, the main effects, and failures."""
+    """Print the best points, the main effects, and failures.
+
+    Args:
+        study: Study.
+        rows: Results of the points.
+        folder: Folder of the study, named in the output.
+    """
     ranking = tables.ranking(study, rows)
     if ranking["rows"]:
         count = min(RANKED_POINTS, len(ranking["rows"]))

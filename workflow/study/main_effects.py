@@ -72,7 +72,7 @@ class MainEffect:
 
 
 def select_measured(rows: Sequence[Row], metric: str) -> list[Row]:
-    """Return the rows in which a metric is a number."""
+    """Return the rows in which a metric is a finite number, in their order."""
     return [row for row in rows if is_number(row.metrics.get(metric, {"value": None})["value"])]
 
 

@@ -19,6 +19,9 @@ def outcomes(study: Study, rows: Sequence[Row]) -> tuple[str, list[Row]]:
     Args:
         study: Study with its metrics.
         rows: Results of the points.
+
+    Returns:
+        Name of the metric, and the points that have it.
     """
     for name in study.metrics:
         described = [row for row in rows if isinstance(row.metrics.get(name, {"value": None})["value"], str)]

@@ -101,6 +101,9 @@ def forecast_stages(points: Sequence[Point], jobs: Sequence[Job]) -> list[StageF
     Args:
         points: All points.
         jobs: Missing products.
+
+    Returns:
+        One forecast per stage: numbers of points and products, and predicted wall time [s].
     """
     forecasts = []
     for stage in dict.fromkeys(name for point in points for name in point.case.pipeline.names):

@@ -39,7 +39,15 @@ def ranking(study: Study, rows: Sequence[Row]) -> dict:
 
 
 def effects(study: Study, rows: Sequence[Row]) -> list[tuple[str, str, list[MainEffect]]]:
-    """Return metric, unit and the main effect of every factor, for each metric that the points have."""
+    """Return metric, unit and the main effect of every factor, for each metric that the points have.
+
+    Args:
+        study: Study with its factors and metrics.
+        rows: Results of the points.
+
+    Returns:
+        One item per metric: its name, its SI unit, and the main effect of each factor.
+    """
     return [
         (name, numeric[0].metrics[name]["unit"], [effect_of(factor, numeric, name) for factor in study.design.factors])
         for name in study.metrics
@@ -73,7 +81,11 @@ def effect_table(effects: Sequence[tuple[str, str, Sequence[MainEffect]]]) -> di
 
 
 def imbalance(rows: Sequence[Row]) -> str:
-    """Return a warning if points without a result or with failed checks bias the means; empty otherwise."""
+    """Return a warning if points without a result or with failed checks bias the means; empty otherwise.
+
+    Args:
+        rows: Results of the points.
+    """
     missing, unsound = sum(not row.metrics for row in rows), sum(row.verdict == UNHEALTHY for row in rows)
     remarks = [text.format(count, len(rows)) for text, count in ((MIXED, missing), (UNSOUND, unsound)) if count]
     return " ".join(remarks)
