@@ -65,6 +65,9 @@ def stabilisation(level: int, damping: float = 0.0) -> float:
         level: Number of the level, 1 for the outermost.
         damping: Coefficient beta over the step DT of the model, at most ``LARGEST_DAMPING``.
 
+    Returns:
+        Dimensionless nu of the Chebyshev polynomials of this level, see ``Substeps``.
+
     Raises:
         LevelError: The damping is too strong.
     """

@@ -17,7 +17,13 @@ ROUNDING = 1e-9
 
 
 def check_division(whole: Whole, survey: Survey, division: Division, rules: Rules) -> None:
-    """Check models and steps of a division.
+    """Check that the models of a division are not empty and that all its steps are stable.
+
+    Args:
+        whole: Joined mesh with its ties.
+        survey: Critical steps, masses and roles of the cells of this mesh.
+        division: Cells of each model, step levels and window to check.
+        rules: Settings from which the division was made.
 
     Raises:
         CouplingError: A model is empty, a step is unstable, or the buffer is too thin or not part of the board.
@@ -104,7 +110,12 @@ def _check_steps(whole: Whole, survey: Survey, division: Division, rules: Rules)
 def steps_of(
     whole: Whole, survey: Survey, division: Division, rules: Rules
 ) -> Iterator[tuple[str, float, NDArray[np.bool_], NDArray[np.float64]]]:
-    """Yield for each step its name, its size [s], the cells that limit it (ne,), and their step limits (ne,) [s]."""
+    """Yield all time steps of a division, each with the cells that limit it.
+
+    Yields:
+        Name of the step for messages, its size [s], mask of the cells that take it, shape (ne,), and the largest stable
+        step of every cell, shape (ne,) [s], of which only the masked ones count.
+    """
     cells, plan = whole.mesh.cells, division.plan
     if division.scheme == "local_steps":
         limits = StepLimits(survey.step, survey.cost, plan.window, rules.fraction, rules.stiffness)
@@ -127,7 +138,7 @@ def check_pulses(durations: Iterable[float], window: float, fraction: float) -> 
     Args:
         durations: Durations of the pulses [s].
         window: Coupling window [s].
-        fraction: Window over critical step, for the message.
+        fraction: Window over critical step (``numerics.step_fraction``), for the message.
 
     Raises:
         PulseError: A pulse is shorter than a window.

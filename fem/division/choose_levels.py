@@ -90,9 +90,17 @@ def choose_levels(
 
 
 def governing_steps(cells: NDArray[np.int32], tie: "Tie", steps: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the smallest critical step, shape (ne,), among all elements that share a node with each element.
+    """Return the smallest critical step among all elements that share a node with each element.
 
     Slaves count as their masters. This step determines the level of the element.
+
+    Args:
+        cells: Nodes of each element, shape (ne, k).
+        tie: Slaves and masters of the mesh.
+        steps: Usable critical step of each element, shape (ne,) [s].
+
+    Returns:
+        Smallest step for each element, shape (ne,) [s].
     """
     node = np.full(int(max(cells.max(), tie.master.max(initial=0), tie.slave.max(initial=0))) + 1, np.inf)
     np.minimum.at(node, cells.ravel(), np.repeat(steps, cells.shape[1]))
@@ -102,7 +110,15 @@ def governing_steps(cells: NDArray[np.int32], tie: "Tie", steps: NDArray[np.floa
 
 
 def least_steps(ratios: tuple[int, ...], limits: StepLimits) -> NDArray[np.float64]:
-    """Return the smallest usable critical step (times fraction) at levels 0, 1, ..., shape (levels + 1,) [s]."""
+    """Return the critical step times ``limits.fraction`` that an element needs at least at each level.
+
+    Args:
+        ratios: Steps of level k + 1 in one step of level k, outermost first; empty for level 0 alone.
+        limits: Window, fraction and damping; the steps of its elements are not used.
+
+    Returns:
+        Smallest step at levels 0, 1, ..., shape (levels + 1,) [s].
+    """
     counts = np.cumprod(ratios)
     reaches = [reach_of(ratio, level, limits.damping) for level, ratio in enumerate(ratios, 1)]
     return np.array([limits.outermost, *(limits.window / (counts * reaches))]) * (1.0 - ROUNDING)
@@ -110,7 +126,13 @@ def least_steps(ratios: tuple[int, ...], limits: StepLimits) -> NDArray[np.float
 
 @cache
 def reach_of(ratio: int, level: int, damping: float) -> float:
-    """Return the largest stable step of a level's substeps relative to plain leapfrog, see ``Substeps``."""
+    """Return the largest stable step of a level's substeps relative to plain leapfrog, see ``Substeps``.
+
+    Args:
+        ratio: Substeps in one step of the surrounding level.
+        level: Number of the level, 1 for the outermost.
+        damping: Coefficient beta of stiffness-proportional damping over the window, dimensionless.
+    """
     return Substeps.of(ratio, level, damping).reach
 
 

@@ -113,7 +113,14 @@ def in_local_steps(
 
 
 def in_path_levels(division: Division, rules: Rules, limits: StepLimits, around: Around) -> Division:
-    """Return a division of held velocity with step levels in its meso model; arguments as ``with_path_levels``."""
+    """Return a division of held velocity with step levels in its meso model; other arguments as ``with_path_levels``.
+
+    Args:
+        division: Division with a single level in the meso model.
+        rules: Settings; their coupling limits the number of levels.
+        limits: Critical steps and costs of all cells.
+        around: Function that returns the meso cells sharing a node with given cells, shape (ne,).
+    """
     return with_path_levels(division, limits, around, rules.coupling.most_levels)
 
 
@@ -155,7 +162,7 @@ def _slow_rows(rules: Rules) -> NDArray[np.bool_]:
 
 
 def plan_estimate(estimate: MeshEstimate, rules: Rules) -> WindowPlan:
-    """Return windows and substeps of an estimated mesh, with the substeps of a DNS."""
+    """Return windows and substeps of an estimated mesh; the substeps are the steps of a DNS in a window."""
     return plan_windows(rules, _slow_rows(rules), estimate.steps)
 
 

@@ -25,7 +25,14 @@ WINDOW_COST = WINDOW_OVERHEAD * UPDATES_PER_SECOND * BOARD_ADVANTAGE  # in updat
 
 
 def divide(whole: Whole, survey: Survey, rules: Rules) -> Division:
-    """Choose scheme, models, levels and window; ``checks.check_division`` then checks the result.
+    """Divide a mesh into macro and meso model: choose scheme, cells, step levels and window.
+
+    The result is not checked yet; ``checks.check_division`` does that.
+
+    Args:
+        whole: Joined mesh with its ties.
+        survey: Critical steps, costs and linearity of its cells.
+        rules: Settings of the division.
 
     Raises:
         LevelError: The critical steps differ by more than the levels allow.
@@ -43,7 +50,13 @@ def divide(whole: Whole, survey: Survey, rules: Rules) -> Division:
 
 
 def scheme_for(whole: Whole, survey: Survey, rules: Rules) -> Choice:
-    """Return the scheme for a mesh, with the reason; raises as ``decide_scheme``."""
+    """Return the coupling scheme for a joined mesh, with the reason; raises as ``decide_scheme``.
+
+    Args:
+        whole: Joined mesh with its ties.
+        survey: Critical steps and linearity of its cells.
+        rules: Settings; ``coupling.scheme`` other than "auto" is returned unchanged.
+    """
     return decide_scheme(
         rules,
         survey.step,

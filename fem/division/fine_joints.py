@@ -50,6 +50,11 @@ def read_coarse(path: Path | None) -> MeshData:
 def with_coarse_joints(mesh: MeshData, coarse: MeshData, fine: Collection[str]) -> MeshData:
     """Replace all joints of a mesh except the fine ones by coarse joints; the order is unchanged.
 
+    Args:
+        mesh: Mesh of board, package and all joints in fine form.
+        coarse: Mesh with coarse joints of the same names.
+        fine: Names of the joints that stay fine, at least one.
+
     Raises:
         MeshError: A joint is unknown, no joint is fine, or a joint is neither fine nor has a coarse mesh.
     """
@@ -94,5 +99,5 @@ def copied_joints(mesh: MeshData) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]
 
 
 def joint_of(part: str) -> str:
-    """Return the joint of a part, empty if the part does not belong to a joint."""
+    """Return the joint of a part named ``<role>@<joint>``, an empty string for a part without ``@``."""
     return part.partition("@")[2]

@@ -27,6 +27,10 @@ LAYERS = ("solder", "substrate", "die")
 def with_neighbours(mesh: MeshData, neighbours: Mapping[str, Neighbour]) -> MeshData:
     """Add neighbouring packages to the board of a mesh, with the facet sets that ``tie_joints`` needs.
 
+    Args:
+        mesh: Mesh with the board.
+        neighbours: Name -> position and sizes of a package on the same board; empty leaves the mesh unchanged.
+
     Raises:
         MeshError: A package lies outside the board.
     """

@@ -9,7 +9,18 @@ from reflowshock.fem.division.whole import Survey
 
 
 def coupling_record(division: Division, survey: Survey, cut_nodes: int) -> dict[str, Any]:
-    """Return scheme with reason, meso share, interface size, and step levels with their elements and cost."""
+    """Return the section ``coupling`` of ``result.json``.
+
+    Args:
+        division: Models and step levels.
+        survey: Properties of the cells, whose costs are summed by level.
+        cut_nodes: Number of interface nodes.
+
+    Returns:
+        ``scheme``, ``why`` (reason as text), ``m`` (meso steps per window), ``ratios``, ``meso_share`` (share of the
+        cells in the meso model), ``cut_nodes``, and ``levels``: a list from the window inwards of dictionaries with
+        ``step`` [s], ``elements`` (count) and ``cost_share`` (share of the total cost per second).
+    """
     plan = division.plan
     level, steps = division.level, (plan.window / division.counts).tolist()
     cost = np.array([float(survey.cost[level == k].sum()) / step for k, step in enumerate(steps)])

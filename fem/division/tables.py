@@ -166,7 +166,7 @@ def join_meshes(data: MeshData) -> Whole:
 def prepare(
     data: MeshData, division: Division | Literal["dns"], rules: Mapping[str, Sequence[int]] = HELD
 ) -> dict[Role, ModelInput[JointTables]]:
-    """Join a mesh and split it into its models; see ``model_inputs``."""
+    """Join the meshes of a package on a board and split them into models; arguments and models as ``model_inputs``."""
     return model_inputs(join_meshes(data), division, rules)
 
 
@@ -193,7 +193,15 @@ def model_inputs(
 
 
 def split(whole: Whole, tables: TablesT, division: Division) -> dict[Role, ModelInput[TablesT]]:
-    """Split a mesh with its tables into ``macro`` and ``meso``; shared nodes and cells count in the macro model."""
+    """Split a mesh with its tables into the models ``macro`` and ``meso``.
+
+    Nodes and cells in both models are loaded and watched in the macro model only.
+
+    Args:
+        whole: Joined mesh with its ties.
+        tables: Loads, supports and watch points in the numbers of this mesh.
+        division: Cells of each model.
+    """
     macro, meso = part_of(whole, division.macro), part_of(whole, division.meso)
     interface = interface_between(whole, part_of(whole, division.around), meso)
     rest = np.where(macro.number < 0, meso.number, -1), np.where(macro.cell_number < 0, meso.cell_number, -1)

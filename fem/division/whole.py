@@ -84,7 +84,12 @@ class Survey:
 
 
 def survey(mesh: MeshData, materials: Materials | Mapping[str, Material], treatment: Treatment) -> Survey:
-    """Determine the properties of the elements of a mesh.
+    """Determine critical steps, masses, linearity and costs of the elements of a mesh.
+
+    Args:
+        mesh: Mesh with named parts.
+        materials: Material of each role.
+        treatment: Formulation, kinematics and mass scaling.
 
     Raises:
         MeshError: An element is inverted.
@@ -116,7 +121,14 @@ def survey(mesh: MeshData, materials: Materials | Mapping[str, Material], treatm
 def add_spring_stiffness(
     survey: Survey, mesh: MeshData, table: FittedTable | None, supports: Mapping[str, Support]
 ) -> Survey:
-    """Return a survey with critical steps reduced by elastic supports."""
+    """Return a survey with critical steps reduced by elastic supports.
+
+    Args:
+        survey: Properties of the elements without supports.
+        mesh: Mesh of these elements.
+        table: Facets of the elastic supports; None returns the same critical steps.
+        supports: Name -> support with its stiffness per area [N/m^3].
+    """
     added_frequency = np.zeros(len(survey.plain_step))  # squared circular frequency [1/s^2]
     for name, facets in table.bedded.items() if table else ():
         cells, corners = mesh.cells[facets.cells], mesh.points[facets.facets]

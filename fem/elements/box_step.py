@@ -18,9 +18,9 @@ def box_element_step(element: str, formulation: str, material: Material, size: N
     """Return the smallest critical time step [s] of the elements into which a box is divided.
 
     Args:
-        element: Hexahedron, tetrahedron or tetrahedron_quadratic. The six tetrahedra share one diagonal of the box; a
-            mesh may use another one.
-        formulation: Formulation of hexahedra, see ``element.element_kind``.
+        element: Element name of case files: ``hexahedron`` (one element), ``tetrahedron`` or ``tetrahedron_quadratic``.
+            The six tetrahedra share one diagonal of the box; a mesh may use another one.
+        formulation: Formulation of hexahedra, see ``element.element_kind``; not used for tetrahedra.
         material: Material with axes along x, y and z.
         size: Edge lengths of the box, shape (3,) [m].
     """
@@ -40,7 +40,7 @@ def box_element_step(element: str, formulation: str, material: Material, size: N
 
 
 def diagonal_tetrahedra() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return points ``(8, 3)`` and cells ``(6, 4)`` of the unit cube cut into six tetrahedra at a diagonal (Kuhn)."""
+    """Return points (8, 3) and cells (6, 4) of the unit cube cut into six tetrahedra at a diagonal (Kuhn)."""
     cells = np.array([[0, 1 << a, 1 << a | 1 << b, 7] for a, b, _ in permutations(range(3))])
     edges = CORNERS[cells[:, 1:]] - CORNERS[cells[:, :1]]
     inside_out = np.linalg.det(edges) < 0.0
@@ -51,7 +51,14 @@ def diagonal_tetrahedra() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
 def with_middle_nodes(
     points: NDArray[np.float64], cells: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return points and 10-node cells with edge midpoints, not shared by neighbours, which the step does not need."""
+    """Return points ``(n', 3)`` and 10-node cells ``(ne, 10)`` of tetrahedra with nodes added at the edge midpoints.
+
+    Neighbours do not share the new nodes, which does not matter for critical steps of single elements.
+
+    Args:
+        points: Vertices, shape (n, 3) [m].
+        cells: Vertices of each tetrahedron, shape (ne, 4).
+    """
     middles = points[cells[:, EDGES]].mean(axis=2)
     numbers = len(points) + np.arange(middles.shape[0] * middles.shape[1]).reshape(middles.shape[:2])
     return np.concatenate([points, middles.reshape(-1, 3)]), np.concatenate([cells, numbers], axis=1)

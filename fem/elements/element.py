@@ -41,7 +41,12 @@ class Elements:
 
 
 def element_kind(nodes: int, formulation: str = HEXAHEDRON.name) -> ElementKind:
-    """Return the kind of element by its number of nodes and, for hexahedra, its formulation."""
+    """Return the kind of element by its number of nodes and, for hexahedra, its formulation.
+
+    Args:
+        nodes: 4 or 10 for tetrahedra, 8 for hexahedra.
+        formulation: Name of the formulation in case files; counts only for hexahedra.
+    """
     if nodes == HEXAHEDRON.nodes:
         return {kind.name: kind for kind in (HEXAHEDRON, ONE_POINT)}[formulation]
     return {kind.nodes: kind for kind in (TETRAHEDRON, TETRAHEDRON_QUADRATIC)}[nodes]
@@ -70,12 +75,21 @@ def element_geometry(points: NDArray[np.float64], cells: NDArray[np.int32]) -> G
 
 
 def element_stiffness(elements: Elements) -> NDArray[np.float64]:
-    """Return the stiffness ``(ne, 3k, 3k)`` [N/m] of each element."""
+    """Return the linear elastic stiffness of each element, node by node, shape (ne, 3k, 3k) [N/m].
+
+    Args:
+        elements: Elements of one kind with k nodes, and their materials.
+    """
     return elements.kind.stiffness(elements.points[elements.cells], elements.elasticity, elements.material)
 
 
 def lumped_mass(elements: Elements, nodal_volume: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the lumped mass ``(n,)`` [kg] from the volume of each node in each element ``(ne, k)`` [m^3]."""
+    """Return the lumped mass of each node, shape (n,) [kg]; not summed over ranks.
+
+    Args:
+        elements: Elements with their density.
+        nodal_volume: Volume of each node in each element, shape (ne, k) [m^3].
+    """
     mass = np.zeros(len(elements.points))
     np.add.at(mass, elements.cells, elements.density[:, None] * nodal_volume)
     return mass
@@ -109,9 +123,12 @@ def critical_steps(
 def classes(elements: Elements) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     """Group elements that are translations of each other, with equal material and density.
 
+    Args:
+        elements: Elements of one kind.
+
     Returns:
-        One element of each class, and the class of each element, shape (ne,) int32. Shapes count as equal within 1e-12
-        of the extent of the model.
+        Index of one element of each class, shape (nc,), and class of each element, shape (ne,) int32. Shapes count as
+        equal within 1e-12 of the extent of the model.
     """
     corners = elements.points[elements.cells]
     extent = float(np.ptp(elements.points, axis=0).max())

@@ -60,7 +60,13 @@ class ElementKind(Protocol):
 
 
 def strain_matrix(gradient: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return B of strain = B u, shape (..., 6, 3k) with u node by node, from gradients ``(..., k, 3)`` [1/m]."""
+    """Return the matrix B of strain = B u, shape (..., 6, 3k) [1/m].
+
+    Rows are xx, yy, zz, xy, yz, xz with engineering shear; u has the components node by node.
+
+    Args:
+        gradient: Gradients of the k shape functions, shape (..., k, 3) [1/m].
+    """
     *outer, nodes, _ = gradient.shape
     matrix = np.zeros((*outer, 6, nodes, 3))
     for row, component, direction in DERIVATIVES:

@@ -21,7 +21,7 @@ def mean_strain(gradient: NDArray[np.float64], displacement: NDArray[np.float64]
 def element_stress(
     gradient: NDArray[np.float64], elasticity: NDArray[np.float64], displacement: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the average stress of elements ``(m, 6)`` [Pa].
+    """Return the average linear elastic stress of elements, components xx yy zz xy yz xz, shape (m, 6) [Pa].
 
     Args:
         gradient: Mean gradients of the shape functions, shape (m, k, 3) [1/m].
@@ -32,24 +32,24 @@ def element_stress(
 
 
 def von_mises(stress: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the von Mises stress ``(m,)`` [Pa] of stresses ``(m, 6)``."""
+    """Return the von Mises stress, shape (m,), of stresses xx yy zz xy yz xz, shape (m, 6), in the same unit."""
     xx, yy, zz, xy, yz, xz = stress.T
     return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * (xy**2 + yz**2 + xz**2))
 
 
 def principal_strains(strain: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the principal strains ``(m, 3)``, ascending, of strains ``(m, 6)`` with engineering shear."""
+    """Return principal strains (m, 3), ascending, of strains xx yy zz xy yz xz (m, 6) with engineering shear."""
     return np.linalg.eigvalsh(symmetric(strain * [1.0, 1.0, 1.0, 0.5, 0.5, 0.5]))
 
 
 def symmetric(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return symmetric matrices ``(m, 3, 3)`` from their components ``(m, 6)``."""
+    """Return symmetric matrices, shape (m, 3, 3), from the components xx yy zz xy yz xz, shape (m, 6)."""
     xx, yy, zz, xy, yz, xz = values.T
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]).transpose(2, 0, 1)
 
 
 def voigt(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the components ``(m, 6)`` of symmetric matrices ``(m, 3, 3)``."""
+    """Return the components xx yy zz xy yz xz, shape (m, 6), of symmetric matrices, shape (m, 3, 3)."""
     return matrices[:, [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]]
 
 

@@ -21,7 +21,11 @@ BARYCENTRIC = np.array([[-1.0, -1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0
 
 
 def quadratic_derivatives(barycentric: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return dN_a/dxi_d ``(q, 10, 3)`` of the quadratic shape functions at barycentric points ``(q, 4)``."""
+    """Return the derivatives dN_a/dxi_d of the ten quadratic shape functions of a tetrahedron, shape (q, 10, 3).
+
+    Args:
+        barycentric: Points in barycentric coordinates, shape (q, 4); xi_d is coordinate d + 1.
+    """
     vertices = (4.0 * barycentric - 1.0)[:, :, None] * BARYCENTRIC
     first, second = EDGES.T
     edges = barycentric[:, first, None] * BARYCENTRIC[second] + barycentric[:, second, None] * BARYCENTRIC[first]

@@ -75,7 +75,7 @@ def force_terms(
         laws: UFL laws by index of ``elements.elasticity``, which replace the materials.
     """
     library = ~np.isin(elements.material, list(laws))
-    return terms_of(elements, library, materials, kinematics, step) + ufl_terms(elements, laws)
+    return terms_of(elements, library, materials, kinematics, step) + _ufl_terms(elements, laws)
 
 
 def terms_of(
@@ -95,7 +95,7 @@ def terms_of(
     return terms
 
 
-def ufl_terms(elements: Elements, laws: "Mapping[int, Law]") -> list[ForceTerm]:
+def _ufl_terms(elements: Elements, laws: "Mapping[int, Law]") -> list[ForceTerm]:
     """Return a force term for each UFL law with elements on this rank; arguments as ``force_terms``."""
     here = {index: np.flatnonzero(elements.material == index) for index in laws}
     if not any(map(len, here.values())):

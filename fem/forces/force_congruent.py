@@ -76,12 +76,12 @@ def arrange_in_rows(elements: Elements) -> tuple[Elements, tuple[int, int, int],
     first, shape = classes(replace(align_boxes(elements), density=np.zeros(len(elements.cells))))
     candidates = []
     for axes in TURNS:
-        ahead = align_boxes(turn_elements(elements, axes))
+        ahead = align_boxes(_turn_elements(elements, axes))
         candidates.append((ahead, axes, BoxRows.find(ahead.points, ahead.cells, shape)))
     return *min(candidates, key=lambda candidate: len(candidate[2].rows)), first
 
 
-def turn_elements(elements: Elements, axes: tuple[int, int, int]) -> Elements:
+def _turn_elements(elements: Elements, axes: tuple[int, int, int]) -> Elements:
     """Return elements in a frame whose directions are the coordinate directions ``axes``."""
     voigt = [VOIGT.index((min(axes[i], axes[j]), max(axes[i], axes[j]))) for i, j in VOIGT]
     elasticity = np.ascontiguousarray(elements.elasticity[:, voigt][:, :, voigt])

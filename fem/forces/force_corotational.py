@@ -109,7 +109,7 @@ class CorotationalBoxes:
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return the strain energy."""
         read_lines(self.nodes, self.axes, displacement, self.lines[0])
-        return split_energies(row_energies(self.rows, self.scales, self.constants, self.lines[0]), self.hourglass)
+        return _split_energies(row_energies(self.rows, self.scales, self.constants, self.lines[0]), self.hourglass)
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,7 +178,7 @@ class TurningBlocks:
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return the strain energy."""
-        return split_energies(self.energies(self.cells, self.filled, self.constants, displacement), self.hourglass)
+        return _split_energies(self.energies(self.cells, self.filled, self.constants, displacement), self.hourglass)
 
 
 class CorotationalBlocks(TurningBlocks):
@@ -230,7 +230,7 @@ def corotational_boxes(everything: Elements, chosen: NDArray[np.int64]) -> Corot
     return rows if len(chosen) >= SHORT_ROWS * len(rows.rows) else CorotationalBlocks.build(everything, chosen)
 
 
-def split_energies(energies: tuple[float, float], hourglass: bool) -> Energy:
+def _split_energies(energies: tuple[float, float], hourglass: bool) -> Energy:
     """Return the energies of mean strains and higher modes [J] as strain energy, the latter optionally as hourglass."""
     mean, higher = energies
     return Energy(strain=mean, hourglass=higher) if hourglass else Energy(strain=mean + higher)

@@ -91,7 +91,7 @@ def gradient_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float6
     weight = determinant / (6.0 * determinant.shape[1])
     points = gradient.shape[1]
     return Blocks(
-        **common_arrays(elements, lanes, plastic),
+        **_common_arrays(elements, lanes, plastic),
         gradient=lanes.spread(gradient.reshape(len(corners), points, -1)),
         weight=lanes.spread(weight[:, :, None]),
         state=initial_state(len(lanes.filled), points, finite),
@@ -104,13 +104,13 @@ def one_point_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float
     shapes = elements.subset(lanes.shape)
     volume = element_geometry(shapes.points, shapes.cells).volume
     return OnePointBlocks(
-        **common_arrays(elements, lanes, plastic),
+        **_common_arrays(elements, lanes, plastic),
         constants=lanes.spread(hexahedron_constants(shapes)[:, None])[:, 0],
         weight=lanes.spread(volume[:, None, None]),
         state=initial_state(len(lanes.filled), 1, finite),
         plastic_work=np.zeros(lanes.element.shape),
         hourglass_energy=np.zeros(lanes.element.shape),
-        slip=written_zeros(len(lanes.filled), 12 * LANES),
+        slip=_written_zeros(len(lanes.filled), 12 * LANES),
         modulus=1.0 / np.linalg.inv(elements.elasticity)[:, 0, 0],
     )
 
@@ -155,14 +155,14 @@ def hexahedron_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.floa
     inverse = np.linalg.inv(transformed[:, LINEAR].transpose(0, 2, 1))
     at_rest = lanes.spread(transformed.reshape(count, 1, -1))[:, 0]
     return HexahedronBlocks(
-        **common_arrays(elements, lanes, plastic),
+        **_common_arrays(elements, lanes, plastic),
         corners=at_rest,
         inverse=lanes.spread(inverse.reshape(count, 1, -1))[:, 0],
         weight=lanes.spread(weight[:, :, None]),
         reciprocal=lanes.spread(1.0 / weight[:, :, None]),
-        basis=lanes.spread(orthonormal_basis(weight).reshape(count, 1, -1))[:, 0],
+        basis=lanes.spread(_orthonormal_basis(weight).reshape(count, 1, -1))[:, 0],
         coupling=lanes.spread(coupling[:, None])[:, 0],
-        state=written_zeros(len(lanes.filled), 8, POINT),
+        state=_written_zeros(len(lanes.filled), 8, POINT),
         place=at_rest[lanes.pattern],
         plastic_work=np.zeros(lanes.element.shape),
         hourglass_energy=np.zeros(lanes.element.shape),
@@ -179,7 +179,7 @@ def gauss_volumes(position: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.linalg.det(np.einsum("kai,gad->kgid", corners, GAUSS_DERIVATIVES, optimize=True))
 
 
-def common_arrays(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64]) -> dict[str, NDArray]:
+def _common_arrays(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64]) -> dict[str, NDArray]:
     """Return the arrays common to blocks of all kinds by name; ``plastic (nm, 6)`` as in ``materials.plasticity``."""
     return {
         "cells": np.ascontiguousarray(elements.cells[lanes.element].transpose(0, 2, 1)),
@@ -191,12 +191,12 @@ def common_arrays(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64]
     }
 
 
-def written_zeros(*shape: int) -> NDArray[np.float64]:
+def _written_zeros(*shape: int) -> NDArray[np.float64]:
     """Return zeros that are written: unwritten pages share one physical page, which some processors read slowly."""
     return np.full(shape, 0.0)
 
 
-def orthonormal_basis(weight: NDArray[np.float64]) -> NDArray[np.float64]:
+def _orthonormal_basis(weight: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return 1, xi, eta, zeta at the Gauss points, orthonormalised with weights ``(ns, 8)``, shape (ns, 4, 8)."""
     functions = np.column_stack([np.ones(8), GAUSS])
     root = np.sqrt(weight)[:, :, None]
@@ -218,6 +218,6 @@ def elastic_constants(elasticity: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def initial_state(blocks: int, points: int, finite: bool) -> NDArray[np.float64]:
     """Return the stress-free state ``(nb, m, 16 * 13)`` of m points, with unit stretch for finite strains."""
-    state = written_zeros(blocks, points, STATE_SLOTS)
+    state = _written_zeros(blocks, points, STATE_SLOTS)
     state[:, :, STRETCH : STRETCH + 3 * LANES] = float(finite)
     return state

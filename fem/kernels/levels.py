@@ -358,13 +358,13 @@ def take_substep(coefficients, inverse, change, state):
 
 @njit(cache=True)
 def end_substeps(rows, foreign, state, values):
-    """Add the sum of a level's forces to rows of ``values``, and zero it.
+    """Add the sum of a level's forces to ``values (>= n, 3)`` [N] of the surrounding level, and zero it.
 
     Args:
         rows: Rows of the level's nodes in ``values``, shape (n,).
         foreign: Free nodes whose sum another rank adds, shape (k,).
         state: State of the level, shape (3, n, 3), see ``take_substep``.
-        values: Forces of the surrounding level, shape (>= n, 3) [N], added to.
+        values: Added to.
     """
     total = state[2]
     for i in range(len(foreign)):
@@ -385,7 +385,7 @@ def run_levels(levels, first, values, force):
     For levels with one assembled matrix and no node of another rank; same operations and order as the kernels above.
 
     Args:
-        levels: Rows to state of each level as above, outermost first; then arrays of ``add_block_force``.
+        levels: Each level: rows, foreign, coefficients (p, 3), inverse, change, state, pointer, columns, blocks.
         first: Index of the level.
         values: Displacement of the surrounding level, shape (>= n, 3) [m].
         force: Force of the surrounding level, shape (>= n, 3) [N], added to.

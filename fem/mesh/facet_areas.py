@@ -13,7 +13,7 @@ from reflowshock.fem.mesh.mesh import MeshData, cells_of_facets
 
 
 def facet_set(mesh: MeshData, name: str) -> NDArray[np.int32]:
-    """Return the facets of a set, shape (nf, m).
+    """Return the node numbers of the facets of a set, shape (nf, m), in the order of ``MeshData.facets``.
 
     Raises:
         LoadError: The mesh has no such set, or it is empty.

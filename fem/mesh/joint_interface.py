@@ -49,7 +49,10 @@ class JointInterfaceTable:
 
 
 def whole_joint_interface(mesh: MeshData) -> JointInterfaceTable:
-    """Return the table of a whole mesh; ``watch_table`` raises an error for facets without a solder element."""
+    """Return the facets on the package pads of all joints of an undivided mesh, in the numbers of this mesh.
+
+    Facets without a solder element are not checked here; ``watch_table`` raises an error for them.
+    """
     joints = joint_names(mesh)
     facets = [mesh.facets_of(f"{SIDE}{name}") for name in joints]
     cells = []

@@ -92,7 +92,7 @@ def without_unused_nodes(data: MeshData) -> tuple[MeshData, NDArray[np.int32]]:
 
 
 def select(data: MeshData, accept: Callable[[str], bool]) -> tuple[MeshData, NDArray[np.int32]]:
-    """Extract the parts whose names are accepted as a mesh; returns and errors as in ``selected_cells``."""
+    """Extract all parts for which ``accept(part_name)`` is true as a mesh; returns and errors as ``selected_cells``."""
     return selected_cells(data, data.in_parts(accept))
 
 
@@ -112,7 +112,16 @@ def selected_cells(data: MeshData, chosen: NDArray[np.bool_]) -> tuple[MeshData,
 def merge_nodes(
     data: MeshData, duplicates: NDArray[np.int32], originals: NDArray[np.int32]
 ) -> tuple[MeshData, NDArray[np.int32]]:
-    """Replace each of ``duplicates`` by the same row of ``originals``; returns as in ``without_unused_nodes``."""
+    """Replace duplicate nodes by their originals in cells and facets, and drop them.
+
+    Args:
+        data: The mesh.
+        duplicates: Nodes to be replaced, shape (k,).
+        originals: Node that replaces each of them, shape (k,).
+
+    Returns:
+        As in ``without_unused_nodes``.
+    """
     number = np.arange(len(data.points), dtype=np.int32)
     number[duplicates] = originals
     facets = {name: number[quads] for name, quads in data.facets.items()}

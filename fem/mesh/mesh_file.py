@@ -25,7 +25,7 @@ MIDDLE[EDGES[:, 0], EDGES[:, 1]] = MIDDLE[EDGES[:, 1], EDGES[:, 0]] = 4 + np.ara
 
 
 def read_meshes(paths: Sequence[Path]) -> MeshData:
-    """Read Gmsh files and concatenate them into one mesh without merging nodes."""
+    """Read Gmsh files and concatenate them into one mesh without merging nodes; raises as ``read_mesh``, ``append``."""
     return append([read_mesh(path) for path in paths])
 
 

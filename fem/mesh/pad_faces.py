@@ -69,7 +69,7 @@ def pad_faces(mesh: MeshData, joints: tuple[str, ...], solder: list[NDArray[np.i
     Args:
         mesh: Whole mesh.
         joints: Names of the joints.
-        solder: Solder elements of each joint.
+        solder: Numbers of the solder elements of each joint, one array per joint in the order of ``joints``.
 
     Raises:
         MeshError: A facet of a pad belongs to no solder element of its joint, or a pad has no facet.

@@ -65,7 +65,12 @@ def octant_volumes(
 
 
 def fraction_below(height: NDArray[np.float64], level: float) -> NDArray[np.float64]:
-    """Return the volume fraction of tetrahedra with vertices at heights (..., 4) below a level, shape (...)."""
+    """Return the fraction of the volume of tetrahedra that lies below a level, shape (...), from 0 to 1.
+
+    Args:
+        height: Heights of the four vertices, shape (..., 4), in the unit of ``level``.
+        level: Height of the horizontal plane.
+    """
     low = np.sort(height, axis=-1) - level
     count = (low <= 0.0).sum(axis=-1)
 

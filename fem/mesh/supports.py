@@ -15,7 +15,12 @@ SYMMETRY = {name: components for name, components in HELD.items() if name != "mo
 
 
 def held_components(mesh: MeshData, rules: Mapping[str, Sequence[int]] = HELD) -> NDArray[np.bool_]:
-    """Return whether each displacement component of each node is fixed, shape (n, 3); ``rules`` is like ``HELD``."""
+    """Return whether each displacement component of each node is fixed, shape (n, 3).
+
+    Args:
+        mesh: The mesh.
+        rules: Facet set -> its fixed components (0, 1, 2 for x, y, z); sets that the mesh lacks fix nothing.
+    """
     held = np.zeros((len(mesh.points), 3), dtype=bool)
     for name, components in rules.items():
         held[np.ix_(mesh.facet_nodes(name), np.array(components))] = True

@@ -95,13 +95,16 @@ def make_rank_elements(
     materials: Materials | Mapping[str, Material],
     formulation: str = HEXAHEDRON.name,
 ) -> RankElements:
-    """Assign materials to the local elements and compute their critical steps.
+    """Assign materials to the elements of this rank and compute their critical steps; not collective.
 
     Args:
-        local: Mesh of the rank.
-        tables: Tables of the model.
-        materials: Material of each role or of each part.
+        local: ``LocalMesh``, cells and nodes of this rank.
+        tables: ``Tables`` of the model (parts, ties, supports, step levels), equal on all ranks.
+        materials: ``Materials`` with one material per role, or one material by part name.
         formulation: Formulation of hexahedra, see ``element.element_kind``.
+
+    Returns:
+        Elements of this rank; its mesh also has the masters of this rank's slaves.
 
     Raises:
         RankError: This rank has no element.
@@ -109,7 +112,7 @@ def make_rank_elements(
     """
     if not len(local.cells):
         raise RankError("a rank has no element of the mesh; use fewer ranks")
-    local = sorted_by_pace(local.with_nodes(*masters_of(local, tables)), tables)
+    local = _sorted_by_pace(local.with_nodes(*_masters_of(local, tables)), tables)
     number = tables.part[local.cell_numbers]
     names, assigned = materials_of_parts(tables.part_names, materials)
     elements = elements_of(local.points, local.cells, number, assigned, formulation)
@@ -119,23 +122,23 @@ def make_rank_elements(
     return RankElements(local, elements, geometry, steps, roles, number, assigned)
 
 
-def sorted_by_pace(local: LocalMesh, tables: Tables) -> LocalMesh:
+def _sorted_by_pace(local: LocalMesh, tables: Tables) -> LocalMesh:
     """Return a mesh with nodes sorted by the smallest pace of their elements."""
     largest = int(tables.every.max())
     if largest == 1:
         return local
     paces = tables.every[local.cell_numbers]
-    _, node_paces = paces_of_nodes(local.cells, paces, local_tie(local, tables.tie), len(local.nodes), largest)
+    _, node_paces = paces_of_nodes(local.cells, paces, _local_tie(local, tables.tie), len(local.nodes), largest)
     return local.reordered(np.argsort(node_paces, kind="stable"))
 
 
-def masters_of(local: LocalMesh, tables: Tables) -> tuple[NDArray[np.integer], NDArray[np.float64]]:
+def _masters_of(local: LocalMesh, tables: Tables) -> tuple[NDArray[np.integer], NDArray[np.float64]]:
     """Return nodes (k,) and points (k, 3) [m] of the masters of this rank's slaves."""
     local_slaves = local.locate(tables.tie.slave) >= 0
     return tables.tie.master[local_slaves].ravel(), tables.master_points[local_slaves].reshape(-1, 3)
 
 
-def local_tie(local: LocalMesh, tie: Tie) -> Tie:
+def _local_tie(local: LocalMesh, tie: Tie) -> Tie:
     """Return the rows of a tie whose slaves are on this rank, in local node numbers."""
     slave = local.locate(tie.slave)
     is_local = slave >= 0
@@ -149,22 +152,29 @@ def make_body(
     mass_factor: NDArray[np.float64],
     response: ForceOptions | None = ForceOptions(),
 ) -> Body:
-    """Assemble masses and force terms of a model; collective.
+    """Assemble masses and force terms of a model, and compile their kernels; collective.
 
     Args:
         comm: Communicator of the model.
         rank_elements: Elements of the rank.
-        tables: Tables of the model.
-        mass_factor: Factor on the density of each element, shape (ne,).
+        tables: ``Tables`` of the model (parts, ties, supports, step levels), equal on all ranks.
+        mass_factor: Factor on the density of each of this rank's elements, shape (ne,); ones without mass scaling.
         response: Kinematics and step; None for linear elastic terms, also for plastic materials.
+
+    Returns:
+        Model of this rank, without attached masses and elastic supports.
+
+    Raises:
+        MassError: Lumped masses differ from density times volume; on every rank.
+        LevelError: Local time steps do not support a material, law or kinematics; on every rank.
     """
     local = rank_elements.local
     plain = rank_elements.elements
     elements = replace(plain, density=plain.density * mass_factor)
     shared = SharedNodes(comm, local.nodes)
-    tie = local_tie(local, tables.tie)
-    mass = assembled_mass(elements, rank_elements.geometry, tie, shared)
-    check_mass(comm, float(mass[shared.owned].sum()), float(elements.density @ rank_elements.geometry.volume))
+    tie = _local_tie(local, tables.tie)
+    mass = _assembled_mass(elements, rank_elements.geometry, tie, shared)
+    _check_mass(comm, float(mass[shared.owned].sum()), float(elements.density @ rank_elements.geometry.volume))
     free = np.ones((len(local.nodes), 3), dtype=bool)
     held = local.locate(tables.held_nodes)
     free[held[held >= 0]] = ~tables.held[held >= 0]
@@ -172,15 +182,15 @@ def make_body(
     interface = local.locate(tables.interface).astype(np.int32)
     body = Body(local, elements, rank_elements.geometry, [], tie, shared, interface, mass, free)
     if response and tables.every.max() > 1:
-        body = with_paces(body, rank_elements, tables, response)
+        body = _with_paces(body, rank_elements, tables, response)
     else:
-        terms = response_terms(comm, body, rank_elements, tables, response) if response else linear_terms(elements)
+        terms = _response_terms(comm, body, rank_elements, tables, response) if response else linear_terms(elements)
         body = replace(body, terms=terms)
     warm_up(body.terms, len(mass))
     return body
 
 
-def with_paces(body: Body, rank_elements: RankElements, tables: Tables, response: ForceOptions) -> Body:
+def _with_paces(body: Body, rank_elements: RankElements, tables: Tables, response: ForceOptions) -> Body:
     """Return a body with separate force terms for the elements of each pace.
 
     Raises:
@@ -198,7 +208,7 @@ def with_paces(body: Body, rank_elements: RankElements, tables: Tables, response
     return replace(body, terms=terms, paces=tuple(paces), schedule=tuple(schedule), element_paces=element_paces)
 
 
-def response_terms(
+def _response_terms(
     comm: MPI.Comm, body: Body, rank_elements: RankElements, tables: Tables, response: ForceOptions
 ) -> list[ForceTerm]:
     """Return the force terms of a body, with one term for all elements that take local time steps; collective.
@@ -221,12 +231,17 @@ def response_terms(
 
 
 def warm_up(terms: Sequence[ForceTerm], count: int) -> None:
-    """Compile the kernels of the force terms at rest, before timing starts; their history does not change."""
+    """Compile the kernels of the force terms before timing starts: compute the force at rest.
+
+    Args:
+        terms: Force terms at rest, without displacement so far; their history does not change.
+        count: Number of nodes of this rank.
+    """
     for term in terms:
         term.add(np.zeros((count, 3)), np.zeros((count, 3)))
 
 
-def assembled_mass(elements: Elements, geometry: Geometry, tie: Tie, shared: SharedNodes) -> NDArray[np.float64]:
+def _assembled_mass(elements: Elements, geometry: Geometry, tie: Tie, shared: SharedNodes) -> NDArray[np.float64]:
     """Return the lumped mass over all ranks, moved from slaves to masters, rowsum(T^T M T), shape (n,) [kg]."""
     column = np.repeat(lumped_mass(elements, geometry.nodal_volume)[:, None], 3, axis=1)
     tie.gather(column)
@@ -234,7 +249,7 @@ def assembled_mass(elements: Elements, geometry: Geometry, tie: Tie, shared: Sha
     return np.ascontiguousarray(column[:, 0])
 
 
-def check_mass(comm: MPI.Comm, lumped: float, integrated: float) -> None:
+def _check_mass(comm: MPI.Comm, lumped: float, integrated: float) -> None:
     """Check that lumped masses [kg] add up to density times volume [kg] over all ranks; collective.
 
     Raises:

@@ -16,12 +16,23 @@ from reflowshock.fem.problem.fittings import Support
 
 
 def beddings_of(local: LocalMesh, table: FittedTable, supports: Mapping[str, Support]) -> list[BeddedFacets]:
-    """Return the elastic supports on the elements of this rank."""
+    """Return the elastic supports on the elements of this rank, one for each support with springs.
+
+    Args:
+        local: Mesh of this rank.
+        table: ``FittedTable`` with the facets of each elastic support by name, equal on all ranks.
+        supports: Support of the case file by name; must contain the names in the table.
+    """
     return [BeddedFacets.build(name, local, facets, supports[name].stiffness) for name, facets in table.bedded.items()]
 
 
 def with_support_stiffness(rank_elements: RankElements, bedding: BeddedFacets) -> RankElements:
-    """Return the elements with critical steps reduced by the stiffness of an elastic support."""
+    """Return a copy of the elements with critical steps reduced by the stiffness of an elastic support.
+
+    Args:
+        rank_elements: Elements of this rank with their critical steps [s].
+        bedding: Elastic support on facets of these elements.
+    """
     elements, cells = rank_elements.elements, bedding.cells
     mass = elements.density[cells][:, None] * rank_elements.geometry.nodal_volume[cells]
     corners = rank_elements.local.points[bedding.facets]
@@ -37,13 +48,14 @@ def with_attachments(
     masses: NDArray[np.float64],
     beddings: Sequence[BeddedFacets],
 ) -> Body:
-    """Return a body with lumped masses and elastic supports; collective.
+    """Return a copy of a body with lumped masses and elastic supports added; collective.
 
     Args:
         body: Body without attachments.
-        nodes: Nodes with a lumped mass in numbers of the input, shape (k,); the mass of slaves moves to their masters.
+        nodes: Nodes with a lumped mass in numbers of the input, shape (k,), the same on all ranks; the mass of slaves
+            moves to their masters.
         masses: Lumped mass at each of these nodes, shape (k,) [kg].
-        beddings: Elastic supports on this rank.
+        beddings: Elastic supports on this rank; may be empty.
     """
     column = np.zeros((len(body.mass), 3))
     local = body.local.locate(nodes)

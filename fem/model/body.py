@@ -79,10 +79,13 @@ def paces_of_nodes(
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Return the smallest pace of the elements at each slave, shape (ns,), and at each node, shape (count,).
 
+    A pace is the number of steps in which an element's force acts once.
+
     Args:
         cells: Nodes of each element, shape (ne, k).
-        paces: Pace of each element, shape (ne,), or empty.
-        tie: Tie of the model; elements of slaves also act on the masters.
+        paces: Pace of each element, shape (ne,); empty if all elements act in every step, then all results are
+            ``largest``.
+        tie: Slaves, masters and weights of the model; elements of slaves also act on the masters.
         count: Number of nodes.
         largest: Pace of nodes without elements.
     """

@@ -63,7 +63,7 @@ class Factorisation:
 
 
 def make_direct(solver: PETSc.KSP) -> None:
-    """Configure a linear solver as one MUMPS Cholesky factorisation."""
+    """Configure a PETSc linear solver (in place) as one MUMPS Cholesky factorisation without iterations."""
     for number, value in SETTINGS.items():  # MUMPS 5.5 under PETSc 3.18 takes them as options only
         PETSc.Options()[f"{PREFIX}mat_mumps_icntl_{number}"] = value
     solver.setOptionsPrefix(PREFIX)

@@ -99,7 +99,16 @@ class Equations:
 
 
 def tied_stiffness(body: Body) -> scipy.sparse.csr_matrix:
-    """Return T^T K T of this rank's elements and elastic supports, shape (3 n, 3 n) [N/m]; zero at slaves."""
+    """Return the stiffness T^T K T of this rank's linear elements and elastic supports; not collective.
+
+    T expresses the displacement of tied slaves by their masters.
+
+    Args:
+        body: Model on this rank, with n nodes.
+
+    Returns:
+        Sparse matrix, node by node in local numbers, shape (3 n, 3 n) [N/m]; rows and columns of slaves are zero.
+    """
     upper = AssembledElements.build(body.elements)
     size = 3 * len(body.mass)
     half = scipy.sparse.bsr_matrix((upper.blocks, upper.columns, upper.pointer), shape=(size, size))

@@ -69,7 +69,7 @@ def highest_frequency(
         return -scale * force
 
     start = np.where(scale > 0.0, random_normal(body.local.nodes), 0.0)
-    largest, iterations = lanczos(product, dot, start, steps_for(unknowns, margin))
+    largest, iterations = _lanczos(product, dot, start, steps_for(unknowns, margin))
     deficit = min(margin_after(iterations, unknowns), margin) if iterations < unknowns else 0.0
     if largest <= 0.0:
         return HighestFrequency(math.inf, deficit, iterations)
@@ -77,17 +77,27 @@ def highest_frequency(
 
 
 def steps_for(unknowns: int, margin: float) -> int:
-    """Return the number of Lanczos steps for a relative margin on omega^2 and a number of unknowns."""
+    """Return the number of Lanczos steps, at most ``unknowns``, after which the margin on omega^2 is reached.
+
+    Args:
+        unknowns: Number of unknowns on all ranks.
+        margin: Relative error of omega^2 that is exceeded with a probability of ``FAILURE_PROBABILITY``, positive.
+    """
     needed = 0.5 * (1.0 + math.log(1.648 * math.sqrt(max(unknowns, 1)) / FAILURE_PROBABILITY) / math.sqrt(margin))
     return min(math.ceil(needed), unknowns)
 
 
 def margin_after(steps: int, unknowns: int) -> float:
-    """Return the relative margin on omega^2 after a number of Lanczos steps; the inverse of ``steps_for``."""
+    """Return the relative margin on omega^2 after a number of Lanczos steps; the inverse of ``steps_for``.
+
+    Args:
+        steps: Number of Lanczos steps taken.
+        unknowns: Number of unknowns on all ranks.
+    """
     return (math.log(1.648 * math.sqrt(max(unknowns, 1)) / FAILURE_PROBABILITY) / max(2 * steps - 1, 1)) ** 2
 
 
-def lanczos(product, dot, start: NDArray[np.float64], steps: int) -> tuple[float, int]:
+def _lanczos(product, dot, start: NDArray[np.float64], steps: int) -> tuple[float, int]:
     """Return the largest Ritz value and the number of steps taken, fewer if the Krylov space is exhausted.
 
     The vectors lose orthogonality by round-off, which repeats Ritz values but moves none outside the spectrum.
@@ -113,17 +123,21 @@ def lanczos(product, dot, start: NDArray[np.float64], steps: int) -> tuple[float
             break
         off_diagonal.append(residual)
         previous, vector = vector, image / residual
-    return largest_of_tridiagonal(diagonal, off_diagonal[: len(diagonal) - 1]), len(diagonal)
+    return _largest_of_tridiagonal(diagonal, off_diagonal[: len(diagonal) - 1]), len(diagonal)
 
 
-def largest_of_tridiagonal(diagonal: Sequence[float], off_diagonal: Sequence[float]) -> float:
+def _largest_of_tridiagonal(diagonal: Sequence[float], off_diagonal: Sequence[float]) -> float:
     """Return the largest eigenvalue of a symmetric tridiagonal matrix."""
     matrix = np.diag(diagonal) + np.diag(off_diagonal, 1) + np.diag(off_diagonal, -1)
     return float(np.linalg.eigvalsh(matrix)[-1])
 
 
 def random_normal(nodes: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Return normal random numbers, shape (n, 3), that depend only on node numbers, not on ranks (splitmix64)."""
+    """Return standard normal random numbers, shape (n, 3), that depend only on node numbers, not on ranks (splitmix64).
+
+    Args:
+        nodes: Input numbers of this rank's nodes, shape (n,).
+    """
     counter = 6 * nodes.astype(np.uint64)[:, None] + np.arange(6, dtype=np.uint64)
     bits = (counter + np.uint64(1)) * np.uint64(SEED)
     bits = (bits ^ (bits >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)

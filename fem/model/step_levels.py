@@ -98,7 +98,7 @@ class SubsteppedElements:
             body: Model on this rank; the nodes of its coupling interface do not move in substeps.
             levels: Levels of the elements, which must be linear elastic.
         """
-        term = build_level(comm, body, levels, 1, np.arange(len(body.mass), dtype=np.int32))
+        term = _build_level(comm, body, levels, 1, np.arange(len(body.mass), dtype=np.int32))
         elements = body.elements.subset(levels.level > 0)
         return replace(term, plain=linear_terms(elements)) if elements.kind.hourglass else term
 
@@ -189,12 +189,17 @@ class SubsteppedElements:
 
 
 def levels_of(terms: Sequence[InternalForce]) -> list[SubsteppedElements]:
-    """Return the force terms with local time steps."""
+    """Return those of the force terms that take local time steps (``SubsteppedElements``), in the same order."""
     return [term for term in terms if isinstance(term, SubsteppedElements)]
 
 
 def check_elastic(materials: Sequence[Material], kinematics: Kinematics, ratios: tuple[int, ...]) -> None:
     """Check that elements with local time steps are linear elastic: substeps from rest have no loading history.
+
+    Args:
+        materials: Materials of these elements.
+        kinematics: Kinematics of the model: small, corotational or finite.
+        ratios: Number of steps of each level in one step of the surrounding level, for the message.
 
     Raises:
         LevelError: A material yields, or kinematics are not small.
@@ -208,7 +213,7 @@ def check_elastic(materials: Sequence[Material], kinematics: Kinematics, ratios:
         )
 
 
-def build_level(
+def _build_level(
     comm: MPI.Comm, body: Body, levels: Levels, number: int, around: NDArray[np.int32]
 ) -> SubsteppedElements:
     """Build a level and the levels inside it; collective.
@@ -220,12 +225,12 @@ def build_level(
         number: Number of the level.
         around: Nodes of the surrounding level, shape (m,).
     """
-    nodes, free = level_nodes(body, levels.level, number)
-    terms = terms_at_nodes(body, levels.level == number, nodes)
+    nodes, free = _level_nodes(body, levels.level, number)
+    terms = _terms_at_nodes(body, levels.level == number, nodes)
     substeps = Substeps.of(levels.ratios[number - 1], number, levels.damping)
     if number < len(levels.ratios):
         inner = replace(levels, step=levels.step / levels.ratios[number - 1])
-        terms.append(build_level(comm, body, inner, number + 1, nodes))
+        terms.append(_build_level(comm, body, inner, number + 1, nodes))
     shared = SharedNodes(comm, body.local.nodes[nodes[:free]], body.shared.clock)
     mass = np.where(body.mass > 0.0, body.mass, np.inf)[nodes[:free], None]
     term = SubsteppedElements(
@@ -239,10 +244,10 @@ def build_level(
         change=np.zeros((free, 3)),
         state=np.zeros((3, len(nodes), 3)),
     )
-    return replace(term, compiled=compiled_arrays(term))
+    return replace(term, compiled=_compiled_arrays(term))
 
 
-def compiled_arrays(level: SubsteppedElements) -> tuple[tuple[NDArray, ...], ...]:
+def _compiled_arrays(level: SubsteppedElements) -> tuple[tuple[NDArray, ...], ...]:
     """Return the arrays with which all substeps of a level run in one compiled call, empty if they cannot."""
     inner = levels_of(level.terms)
     element_terms = [term for term in level.terms if term not in inner]
@@ -255,7 +260,7 @@ def compiled_arrays(level: SubsteppedElements) -> tuple[tuple[NDArray, ...], ...
     return ((*arrays, matrix.pointer, matrix.columns, matrix.blocks), *(inner[0].compiled if inner else ()))
 
 
-def level_nodes(body: Body, level: NDArray[np.int32], number: int) -> tuple[NDArray[np.int32], int]:
+def _level_nodes(body: Body, level: NDArray[np.int32], number: int) -> tuple[NDArray[np.int32], int]:
     """Return the nodes of a level and the levels inside it, without slaves, and the number of moving ones; collective.
 
     The moving nodes come first. They belong to no element of an outer level on any rank, nor to a master of its slaves.
@@ -275,17 +280,17 @@ def level_nodes(body: Body, level: NDArray[np.int32], number: int) -> tuple[NDAr
     return nodes.astype(np.int32), int(np.sum(used & moves))
 
 
-def terms_at_nodes(body: Body, chosen: NDArray[np.bool_], nodes: NDArray[np.int32]) -> list[InternalForce]:
+def _terms_at_nodes(body: Body, chosen: NDArray[np.bool_], nodes: NDArray[np.int32]) -> list[InternalForce]:
     """Return the force terms of selected elements of a body, numbered by ``nodes``, none of which is a slave."""
     is_used = np.isin(body.tie.slave, body.elements.cells[chosen])
     tie = Tie(body.tie.slave[is_used], body.tie.master[is_used], body.tie.weight[is_used])
     order = np.concatenate([nodes, tie.slave])
     elements = body.elements.subset(chosen)
     renumbered = replace(elements, points=elements.points[order], cells=positions(order, elements.cells))
-    return tied_terms(renumbered, Tie(positions(order, tie.slave), positions(order, tie.master), tie.weight))
+    return _tied_terms(renumbered, Tie(positions(order, tie.slave), positions(order, tie.master), tie.weight))
 
 
-def tied_terms(elements: Elements, tie: Tie) -> list[InternalForce]:
+def _tied_terms(elements: Elements, tie: Tie) -> list[InternalForce]:
     """Return the force terms of linear elements with the slaves, which must be the last nodes, eliminated.
 
     Boxes with a slave no longer share their stiffness with other boxes, so they are assembled.
@@ -295,11 +300,11 @@ def tied_terms(elements: Elements, tie: Tie) -> list[InternalForce]:
     if box.any():
         terms.append(CongruentElements.build(elements.subset(box)))
     if not box.all():
-        terms.append(without_slaves(AssembledElements.build(elements.subset(~box)), tie))
+        terms.append(_without_slaves(AssembledElements.build(elements.subset(~box)), tie))
     return terms
 
 
-def without_slaves(assembled: AssembledElements, tie: Tie) -> AssembledElements:
+def _without_slaves(assembled: AssembledElements, tie: Tie) -> AssembledElements:
     """Return the assembled stiffness T^T K T without the slaves, T the tie."""
     if not len(tie.slave):
         return assembled
@@ -316,7 +321,15 @@ def without_slaves(assembled: AssembledElements, tie: Tie) -> AssembledElements:
 
 
 def upper_blocks(matrix: scipy.sparse.bsr_matrix, count: int) -> AssembledElements:
-    """Return the upper blocks, with halved diagonal, of the first ``count`` block rows of a symmetric matrix."""
+    """Return the upper 3 x 3 blocks of the first ``count`` block rows of a symmetric matrix, as a force term.
+
+    Args:
+        matrix: Symmetric stiffness in block rows with sorted columns, all blocks stored, shape (3 n, 3 n) [N/m].
+        count: Number of leading nodes; the later ones must have no entries in these rows.
+
+    Returns:
+        Assembled stiffness with halved diagonal blocks, as ``kernels.force.add_block_force`` expects.
+    """
     row = np.repeat(np.arange(matrix.shape[0] // 3), np.diff(matrix.indptr))
     is_upper = (row <= matrix.indices) & (row < count)
     columns = matrix.indices[is_upper].astype(np.int32)

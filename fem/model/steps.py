@@ -67,7 +67,14 @@ class Steps:
 
 
 def steps_of_division(whole: Whole, survey: Survey, division: Division, rules: Rules) -> Steps:
-    """Return the steps of a divided mesh."""
+    """Return the time steps of a run whose mesh is divided into macro and meso model; not collective.
+
+    Args:
+        whole: Mesh of both models with its ties.
+        survey: Role, mass and critical step of each element of the mesh.
+        division: Cells of each model, step levels and windows.
+        rules: Settings of the division, with the damping.
+    """
     critical = damped_critical_step(survey.step, rules.stiffness)
     _, _, slow, _ = next(steps_of(whole, survey, division, rules))
     roles = np.unique(survey.role).tolist()
@@ -84,7 +91,13 @@ def steps_of_division(whole: Whole, survey: Survey, division: Division, rules: R
 
 
 def single_model_steps(steps: Steps, critical: float, rules: Rules) -> Steps:
-    """Return the steps of an undivided model with the same windows and its own critical step [s]."""
+    """Return the steps of an undivided model with the same windows as a divided one.
+
+    Args:
+        steps: Steps of the divided model.
+        critical: Undamped critical step of the undivided model [s].
+        rules: Settings of the division: step over critical step, and damping.
+    """
     smallest = damped_critical_step(critical, rules.stiffness)
     substeps = math.ceil(steps.plan.window / (rules.fraction * smallest))
     return replace(steps, plan=replace(steps.plan, substeps=substeps), smallest=smallest)
@@ -117,16 +130,27 @@ def assembled_step(
 
 
 def find_minimum(world: MPI.Comm, values: Sequence[NDArray[np.float64]]) -> float:
-    """Return the smallest of all values on all ranks, infinity if there are none; collective."""
+    """Return the smallest of all values of all arrays on all ranks, infinity if there are none; collective.
+
+    Args:
+        world: Communicator of all ranks that take part.
+        values: Arrays of this rank, of any shape; at least one, which may be empty.
+    """
     return float(world.allreduce(min(float(array.min(initial=np.inf)) for array in values), MPI.MIN))
 
 
 def mass_factor(rank_elements: RankElements, scaled: Sequence[str], target: float) -> NDArray[np.float64]:
-    """Return the density factor, shape (ne,), that raises the critical steps of the scaled roles to ``target`` [s]."""
+    """Return the density factor of each element, shape (ne,), that raises critical steps to a target (mass scaling).
+
+    Args:
+        rank_elements: Elements of this rank with their critical steps [s] and material roles.
+        scaled: Material roles with mass scaling; other elements have the factor 1.
+        target: Critical step to reach [s]; elements with larger steps have the factor 1.
+    """
     return np.where(np.isin(rank_elements.roles, scaled), np.maximum(1.0, (target / rank_elements.steps) ** 2), 1.0)
 
 
-def critical_by_role(
+def _critical_by_role(
     world: MPI.Comm, models: Sequence[RankElements], roles: Iterable[str] = tuple(Materials.model_fields)
 ) -> dict[str, float]:
     """Return the smallest element critical step [s] of each material role over all ranks; collective."""
@@ -138,15 +162,20 @@ def explicit_steps(comm: MPI.Comm, rank_elements: RankElements, dynamics: Dynami
     """Choose the steps of central differences from the critical steps of the elements; collective.
 
     Mass scaling raises them, stiffness-proportional damping lowers them.
+
+    Args:
+        comm: Communicator of the model.
+        rank_elements: Elements of this rank with their critical steps.
+        dynamics: Settings of the dynamics: duration, damping, steps and roles with mass scaling.
     """
     scaled = dynamics.numerics.mass_scaled
     target = find_minimum(comm, [rank_elements.steps[~np.isin(rank_elements.roles, scaled)]])
     factor = mass_factor(rank_elements, scaled, target)
     critical = find_minimum(comm, [rank_elements.steps * np.sqrt(factor)])
-    return make_steps(comm, rank_elements, factor, *explicit_plan(dynamics, critical))
+    return _make_steps(comm, rank_elements, factor, *_explicit_plan(dynamics, critical))
 
 
-def explicit_plan(dynamics: Dynamics, undamped: float) -> tuple[WindowPlan, float]:
+def _explicit_plan(dynamics: Dynamics, undamped: float) -> tuple[WindowPlan, float]:
     """Return the windows and the damped critical step [s], from the undamped critical step [s]."""
     critical = damped_critical_step(undamped, dynamics.damping.coefficients[1])
     step = dynamics.numerics.explicit_step or dynamics.numerics.step_fraction * critical
@@ -154,7 +183,11 @@ def explicit_plan(dynamics: Dynamics, undamped: float) -> tuple[WindowPlan, floa
 
 
 def check_step(dynamics: Dynamics, critical: float) -> None:
-    """Check that an explicit step of the input is at most the critical step [s].
+    """Check that an explicit step of the input is at most the critical step; does nothing if the input has none.
+
+    Args:
+        dynamics: Settings of the dynamics.
+        critical: Damped critical step of the model [s].
 
     Raises:
         StepError: The step is larger.
@@ -169,34 +202,51 @@ def check_step(dynamics: Dynamics, critical: float) -> None:
 
 
 def with_critical(steps: Steps, undamped: float, dynamics: Dynamics) -> Steps:
-    """Return explicit steps for another undamped critical step [s]."""
-    plan, critical = explicit_plan(dynamics, undamped)
+    """Return a copy of explicit steps, with windows chosen for another critical step.
+
+    Args:
+        steps: Steps of a single model.
+        undamped: Critical step without damping [s].
+        dynamics: Settings of the dynamics.
+    """
+    plan, critical = _explicit_plan(dynamics, undamped)
     return replace(steps, plan=plan, macro_critical=critical, smallest=critical)
 
 
 def implicit_steps(comm: MPI.Comm, rank_elements: RankElements, dynamics: Dynamics, pulses: Iterable[float]) -> Steps:
-    """Choose the steps of the implicit solver, from the input or the shortest pulse duration [s]; collective."""
+    """Choose the steps of the implicit solver; collective.
+
+    Args:
+        comm: Communicator of the model.
+        rank_elements: Elements of this rank; their critical steps are only reported.
+        dynamics: Settings of the dynamics, which may contain the step.
+        pulses: Durations of the load pulses [s]; the shortest sets the step if the input has none.
+    """
     critical, plan = find_minimum(comm, [rank_elements.steps]), window_plan(dynamics, implicit_step(dynamics, pulses))
-    return make_steps(comm, rank_elements, np.ones(len(rank_elements.steps)), plan, critical)
+    return _make_steps(comm, rank_elements, np.ones(len(rank_elements.steps)), plan, critical)
 
 
 def window_plan(dynamics: Dynamics, largest: float) -> WindowPlan:
-    """Return windows that end at the samples, with no step above ``largest`` [s].
+    """Return windows of equal length that end at the history samples, divided into steps.
 
     Different solvers then sample a problem at the same times, unless a run has fewer steps than samples.
+
+    Args:
+        dynamics: Settings of the dynamics: duration and number of history samples.
+        largest: Largest step [s].
     """
-    samples = min(dynamics.numerics.history_samples, round_up(dynamics.duration / largest))
-    stride = round_up(dynamics.duration / samples / largest / LONGEST_WINDOW)
+    samples = min(dynamics.numerics.history_samples, _round_up(dynamics.duration / largest))
+    stride = _round_up(dynamics.duration / samples / largest / LONGEST_WINDOW)
     windows = samples * stride
-    return WindowPlan(dynamics.duration / windows, round_up(dynamics.duration / windows / largest), windows, stride)
+    return WindowPlan(dynamics.duration / windows, _round_up(dynamics.duration / windows / largest), windows, stride)
 
 
-def round_up(count: float) -> int:
+def _round_up(count: float) -> int:
     """Return ``count`` rounded up to an integer of at least 1, tolerant of round-off in the ratio."""
     return max(1, math.ceil(count * (1.0 - ROUNDING)))
 
 
-def make_steps(
+def _make_steps(
     comm: MPI.Comm, rank_elements: RankElements, factor: NDArray[np.float64], plan: WindowPlan, critical: float
 ) -> Steps:
     """Return the steps of a single model with its masses; collective.
@@ -212,7 +262,7 @@ def make_steps(
     return Steps(
         plan=plan,
         mass_factors=[factor],
-        critical=critical_by_role(
+        critical=_critical_by_role(
             comm, [rank_elements], sorted(set(comm.allreduce(sorted(set(rank_elements.roles.tolist())))))
         ),
         macro_critical=critical,

@@ -114,6 +114,10 @@ class StressRecovery:
 
 
 def polar(deformation: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return rotation R and stretch U, shape (k, 3, 3), of deformation gradients F = R U with positive determinants."""
+    """Return rotations R and stretches U, shape (k, 3, 3) each, of deformation gradients F = R U.
+
+    Args:
+        deformation: Deformation gradients F with positive determinants, shape (k, 3, 3).
+    """
     left, values, right = np.linalg.svd(deformation)
     return left @ right, right.transpose(0, 2, 1) @ (values[:, :, None] * right)

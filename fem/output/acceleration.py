@@ -72,7 +72,7 @@ def apply_low_pass(values: NDArray[np.float64], step: float, low_pass: LowPass) 
 
 
 def is_sampled(time: NDArray[np.float64], low_pass: LowPass) -> bool:
-    """Return whether sample times, shape (n,) [s], are dense enough and long enough for a filter."""
+    """Return whether equal sample times, shape (n,) [s], are dense and long enough to apply a low-pass filter."""
     step = float(time[-1] - time[0]) / max(len(time) - 1, 1)
     return len(time) > RATE and step * RATE * low_pass.frequency <= 1.0 + 1e-9
 
@@ -85,7 +85,12 @@ def acceleration(time: NDArray[np.float64], displacement: NDArray[np.float64], l
 
 
 def peaks_of(accelerations: Mapping[str, Acceleration], low_pass: LowPass) -> dict[str, dict[str, Any]]:
-    """Return the peaks of named accelerations [G] and their filter as metrics; empty without accelerations."""
+    """Return the peaks of named accelerations and their filter as metrics; empty without accelerations.
+
+    Returns:
+        ``peak_acceleration@<name>`` and ``second_peak_acceleration@<name>`` (largest later peak of opposite sign) [G],
+        and ``acceleration_filter`` (text), each as ``{"value": ..., "unit": ...}``.
+    """
     peaks = {
         metric: {"value": value, "unit": "G"}
         for name, history in accelerations.items()

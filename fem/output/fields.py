@@ -95,7 +95,16 @@ class Fields:
 
 
 def element_peaks(world: MPI.Comm, files: Iterable[Fields], parts: Sequence[str]) -> dict[str, dict[str, float]]:
-    """Return the largest value of each cell field in each part, over all models and field samples; collective."""
+    """Return the largest value of each cell field in each part, over all models and field samples; collective.
+
+    Args:
+        world: Communicator of all ranks.
+        files: Field files of this rank's models, at least one.
+        parts: Names of all parts, in the order of their indices.
+
+    Returns:
+        Field name -> part name -> largest value in SI units, 0 for a part without cells.
+    """
     all_peaks = [file.peaks for file in files]
     return {
         field: {

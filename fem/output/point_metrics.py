@@ -15,7 +15,16 @@ from reflowshock.fem.problem.filters import LowPass
 
 
 def point_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
-    """Return the peaks at watch points and supports as metrics ``<metric>@<name>``."""
+    """Return the peaks at watch points and supports as metrics, each as ``{"value": ..., "unit": ...}``.
+
+    Args:
+        arrays: Arrays of ``history.npz`` by name.
+
+    Returns:
+        For each watch point ``peak_displacement@<name>``, ``displacement_range@<name>`` [m], ``peak_strain@<name>``,
+        ``peak_von_mises@<name>`` [Pa] and, with plasticity, ``peak_plastic_strain@<name>``; for each support
+        ``peak_reaction@<name>`` [N].
+    """
     metrics: dict[str, Any] = {}
     for name in arrays["watch"]:
         displacement, stress = arrays[f"displacement@{name}"], arrays[f"stress@{name}"]
@@ -45,7 +54,15 @@ def _strain_rate(time: NDArray[np.float64], strain: NDArray[np.float64], low_pas
 
 
 def gauge_metrics(arrays: Mapping[str, NDArray], low_pass: LowPass) -> dict[str, Any]:
-    """Return the peak strain of each gauge and, if samples are dense enough, its peak strain rate."""
+    """Return the peaks of strain gauges as metrics, each as ``{"value": ..., "unit": ...}``.
+
+    Args:
+        arrays: Arrays of ``history.npz``: ``time`` [s], ``gauges`` (names) and ``gauge@<name>`` (strain).
+        low_pass: Filter of the strain before its rate is computed.
+
+    Returns:
+        ``peak_strain@<name>`` and, if samples are dense enough for the filter, ``peak_strain_rate@<name>`` [1/s].
+    """
     metrics: dict[str, Any] = {}
     sampled = is_sampled(arrays["time"], low_pass)
     for name in arrays["gauges"]:
@@ -58,7 +75,7 @@ def gauge_metrics(arrays: Mapping[str, NDArray], low_pass: LowPass) -> dict[str,
 
 
 def mode_metrics(modes: ModeTable | None) -> dict[str, Any]:
-    """Return up to four natural frequencies as metrics."""
+    """Return the lowest natural frequencies [Hz] as ``first_frequency`` to ``fourth_frequency``; empty for None."""
     frequencies = [] if modes is None else modes.frequency.tolist()
     names = ("first", "second", "third", "fourth")
     return {f"{name}_frequency": quantity(value, "Hz") for name, value in zip(names, frequencies, strict=False)}

@@ -49,16 +49,24 @@ OUTER_FIBRE = Measure("outer_fibre", "outer-fibre stress", "Pa")
 
 
 def ranking_measure(arrays: Arrays) -> Measure:
-    """Return the ranking measure: plastic work density if any solder has yielded, otherwise peel stress."""
+    """Return the ranking measure: plastic work density if any solder has yielded, otherwise peel stress.
+
+    Args:
+        arrays: Arrays of ``history.npz``: ``peel_<end>`` and, with plasticity, ``plastic_work_<end>`` for the ends
+            ``board`` and ``package``, each of shape (times, joints).
+    """
     yielded = "plastic_work_board" in arrays and bool(PLASTIC_WORK.peaks(arrays).max(initial=0.0) > 0.0)
     return PLASTIC_WORK if yielded else PEEL
 
 
 def rank_joints(arrays: Arrays) -> NDArray[np.intp]:
-    """Return the joint numbers, critical joint first and ties by peel stress, shape (joints,)."""
+    """Return the joint numbers, critical joint first and ties by peel stress, shape (joints,).
+
+    ``arrays`` is as in ``ranking_measure``.
+    """
     return np.lexsort((-PEEL.peaks(arrays), -ranking_measure(arrays).peaks(arrays)))
 
 
 def critical_joint(arrays: Arrays) -> int:
-    """Return the number of the critical joint."""
+    """Return the index of the critical joint, the first of ``rank_joints``; ``arrays`` as in ``ranking_measure``."""
     return int(rank_joints(arrays)[0])

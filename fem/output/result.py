@@ -113,12 +113,17 @@ def write_result(comms: Communicators, report: Report, outcome: Outcome[Any], ti
 
 
 def quantity(value: Any, unit: str = "") -> dict[str, Any]:
-    """Return a metric as value and unit."""
+    """Return a metric for ``result.json``, ``{"value": value, "unit": unit}``; an empty unit means dimensionless."""
     return {"value": value, "unit": unit}
 
 
 def model_summary(comms: Communicators, steps: Steps, mode: str) -> dict[str, Any]:
-    """Return mode, ranks, time steps and masses of a run."""
+    """Return mode, ranks, time steps and masses of a run.
+
+    Returns:
+        ``mode`` (as given), ``ranks`` (count), ``placement`` (name), ``critical_steps`` (material role -> step [s]),
+        ``window``, ``step`` [s], ``substeps``, ``windows`` (counts), ``added_mass`` and ``model_mass`` [kg].
+    """
     plan = steps.plan
     return {
         "mode": mode,
@@ -150,7 +155,16 @@ def peak_memory() -> int:
 def health(
     request: RunInput | StructureInput, outcome: Outcome[Any], more: Mapping[str, tuple[float, float]] = {}
 ) -> dict[str, Any]:
-    """Return the health checks of a finished run; ``more`` adds checks as value and limit by name."""
+    """Return the health checks of a finished run: energy balance, added mass, hourglass energy.
+
+    Args:
+        request: Input of the run, with the limit of the energy balance.
+        outcome: History and steps of the run.
+        more: Additional checks, name -> (value, limit).
+
+    Returns:
+        Checks as in ``make_checks``.
+    """
     balance, steps = outcome.history.balance, outcome.steps
     checks = {
         "energy_balance_error": (balance.balance_error, request.numerics.energy_balance_limit),
@@ -172,5 +186,5 @@ def _hourglass_check(history: History, formulation: str) -> dict[str, tuple[floa
 
 
 def make_checks(checks: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
-    """Return named checks with value, limit and whether the value is at most the limit."""
+    """Return checks, name -> (value, limit), as name -> ``{"value", "limit", "ok"}``; ``ok``: value at most limit."""
     return {name: {"value": value, "limit": limit, "ok": value <= limit} for name, (value, limit) in checks.items()}
