@@ -57,5 +57,5 @@ SHAPES = {shape.nodes: shape for shape in (HEXAHEDRON, TETRAHEDRON, TETRAHEDRON_
 
 
 def shape_of(cells: NDArray[np.integer]) -> CellShape:
-    """Return the shape of cells ``(ne, k)``."""
+    """Return the shape of cells from their number of nodes k, of an array of shape (ne, k); raises ``KeyError``."""
     return SHAPES[cells.shape[1]]

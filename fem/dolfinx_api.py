@@ -96,7 +96,10 @@ def cell_dofs(space: dolfinx.fem.FunctionSpace) -> NDArray[np.int32]:
 
 
 def quadrature_space(mesh: dolfinx.mesh.Mesh, degree: int, shape: tuple[int, ...]) -> dolfinx.fem.FunctionSpace:
-    """Return the space of values of a shape at the integration points of a rule of some degree."""
+    """Return the space of values, of tensor shape ``shape`` (() for scalars), at the points of a quadrature rule.
+
+    ``degree`` is the polynomial degree that the rule integrates exactly.
+    """
     if OLD:
         element = ufl.FiniteElement("Quadrature", mesh.ufl_cell(), degree=degree, quad_scheme="default")
         if len(shape) == 1:
@@ -113,7 +116,10 @@ def quadrature_space(mesh: dolfinx.mesh.Mesh, degree: int, shape: tuple[int, ...
 def at_quadrature_points(
     mesh: dolfinx.mesh.Mesh, expression: ufl.core.expr.Expr, degree: int
 ) -> Callable[[], NDArray[np.float64]]:
-    """Return what evaluates an expression of UFL at the integration points of all cells, ``(ne, points * size)``.
+    """Return a function that evaluates a UFL expression at the integration points of all local cells.
+
+    The function takes no arguments and returns current values, shape (ne, points * size), point by point. ``degree`` is
+    the degree of the quadrature rule.
 
     Each test function of their space is one at its own point and zero at all others, so that the integral of the
     expression times it is the value there times the weight.
@@ -134,7 +140,7 @@ def at_quadrature_points(
 
 
 def assembled_csr(form) -> scipy.sparse.csr_matrix:  # its type has another name in each version
-    """Return the matrix of a bilinear form."""
+    """Return the assembled matrix of a compiled bilinear form, on a single rank."""
     matrix = dolfinx.fem.petsc.assemble_matrix(form)
     matrix.assemble()
     pointers, columns, values = matrix.getValuesCSR()
@@ -144,7 +150,7 @@ def assembled_csr(form) -> scipy.sparse.csr_matrix:  # its type has another name
 
 
 def compiled_form(form: ufl.Form, flags: list[str]):  # its type has another name in each version
-    """Return a form that the C compiler translated with these flags."""
+    """Compile a UFL form with flags of the C compiler, such as ``["-O3"]``, and return it as a DOLFINx form."""
     if OLD:
         return dolfinx.fem.form(form, jit_params={"cffi_extra_compile_args": flags})
     return dolfinx.fem.form(form, jit_options={"cffi_extra_compile_args": flags})

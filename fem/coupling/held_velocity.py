@@ -212,11 +212,11 @@ class HeldVelocityMeso(VelocityFollower):
 
 
 def local_interface(body: Body) -> NDArray[np.int32]:
-    """Return the local numbers of the interface nodes on this rank."""
+    """Return the local numbers of the interface nodes on this rank, shape (k,)."""
     return body.interface[body.interface >= 0]
 
 
 def counted_interface(body: Body) -> NDArray[np.int32]:
-    """Return the local numbers of the interface nodes that this rank owns."""
+    """Return the local numbers of the interface nodes that this rank owns, shape (k,), each on one rank only."""
     nodes = local_interface(body)
     return nodes[body.shared.owned[nodes]]

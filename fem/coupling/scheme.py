@@ -51,7 +51,7 @@ class LocalSteps:
 
 
 def scheme_of(name: SchemeName, direction: Direction = "two_way") -> Scheme:
-    """Return the scheme of a name and direction.
+    """Return the coupling scheme, as an object that creates the participants, of a name and direction.
 
     Raises:
         ValueError: The scheme does not support one-way coupling.

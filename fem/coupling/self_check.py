@@ -66,12 +66,18 @@ class SelfCheck:
 
 
 def recorded(checked: SelfCheck | None) -> dict[str, Any]:
-    """Return the self-check as a section of the result, empty for a run with one model."""
+    """Return the self-check as a section of ``result.json``; empty for None, which is a run with one model."""
     return {"self_check": asdict(checked)} if checked else {}
 
 
 def self_check(world: MPI.Comm, bodies: Mapping[Role, Body], channels: InterfaceChannels) -> SelfCheck:
-    """Check fields, forces and masses through ties and interface of two models; collective over ``world``."""
+    """Check fields, forces and masses through ties and interface of two models; collective over ``world``.
+
+    Args:
+        world: Communicator of all ranks.
+        bodies: Models of this rank, ``macro``, ``meso`` or both.
+        channels: Open channels between both models.
+    """
     size = max(float(np.ptp(body.local.points, axis=0).max()) for body in bodies.values())
     size = world.allreduce(size, MPI.MAX)
     rigid, linear = (_field_error(bodies, channels, gradient, size) for gradient in (RIGID, LINEAR))

@@ -68,7 +68,16 @@ def families(mesh: MeshData, kind: Kind) -> NDArray[np.int8]:
 
 
 def samples(mesh: MeshData, family: NDArray[np.int8], ranks: int) -> dict[int, tuple[MeshData, MeshData]]:
-    """Return a small and a large sample of each family in a mesh, with cells that follow each other in the mesh."""
+    """Return a small and a large sample of each family in a mesh, with cells that follow each other in the mesh.
+
+    Args:
+        mesh: The mesh.
+        family: Index of each element's family in ``FAMILIES``, shape (ne,).
+        ranks: Number of ranks that share the mesh, which limits the size of the samples.
+
+    Returns:
+        Index of each family present -> (small sample, large sample).
+    """
     sampled = {}
     for number in np.unique(family).tolist():
         chosen = np.flatnonzero(family == number)
@@ -86,6 +95,10 @@ def _some_cells(mesh: MeshData, chosen: NDArray[np.int64], count: int) -> MeshDa
 
 def measured_costs(world: MPI.Comm, chosen: Mapping[int, tuple[MeshData, MeshData, Kind]]) -> StepCost:
     """Time a small and a large sample of each family on all ranks simultaneously, as in a run; collective.
+
+    Args:
+        world: Communicator of all ranks.
+        chosen: Index of a family in ``FAMILIES`` -> its small and large sample, and how its elements are computed.
 
     Returns:
         Costs of shape (ranks, 5), zero for families without a sample.
@@ -106,7 +119,8 @@ def fit_step_cost(
 ) -> tuple[float, float]:
     """Return the fixed time of a step and the time per element [s], from two samples.
 
-    The elements take at least half of the time of the large sample; a smaller share would be a disturbed measurement.
+    The arguments are the numbers of elements of both samples and their measured times of one step [s]. The elements
+    take at least half of the time of the large sample; a smaller share would be a disturbed measurement.
     """
     count = large_count - small_count
     element = max((large_seconds - small_seconds) / count if count else 0.0, 0.5 * large_seconds / large_count)

@@ -57,9 +57,10 @@ def _candidates(substeps: int, most: int) -> Iterator[tuple[int, ...]]:
 
 
 def opaque_ratio(fraction: float) -> float:
-    """Return the ratio of critical step to step above which one layer of cells decays a wave as much as two layers.
+    """Return the ratio of a cell's step limit to the larger step above which one layer decays as much as two.
 
-    Both steps are ``fraction`` of critical steps. The decay exponent doubles if arcosh(r x) = 2 arcosh(x).
+    Both steps are ``fraction`` times critical steps [s]; the ratio is dimensionless. The decay exponent doubles if
+    arcosh(r x) = 2 arcosh(x).
     """
     just = 0.5 * math.pi / fraction
     return 2.0 * just - 1.0 / just

@@ -106,6 +106,6 @@ def plastic_laws(materials: Mapping[str, Material]) -> dict[str, JohnsonCook]:
 
 
 def yields(name: str, law: JohnsonCook) -> str:
-    """Return a sentence on the yield stress and the hardening of a material."""
+    """Return a sentence on the yield stress and the hardening of the material ``name`` with a Johnson-Cook law."""
     hardening = f", hardening {1e-6 * law.B:g} MPa p^{law.n:g}" if law.B > 0.0 else ", no hardening"
     return f"{name} yields from {1e-6 * law.A:g} MPa on{hardening}"

@@ -76,7 +76,7 @@ class Alternative:
 
 
 def shared(roles: Sequence[Role], size: int) -> Placement:
-    """Return the placement of all models on all of ``size`` ranks."""
+    """Return the placement of all models (``macro``, ``meso`` or ``dns``) on all of ``size`` ranks."""
     return Placement(dict.fromkeys(roles, tuple(range(size))))
 
 
@@ -107,7 +107,13 @@ def _admissible(ranks: Ranks, speeds: Sequence[float]) -> Iterator[Placement]:
 
 
 def alternatives(ranks: Ranks, speeds: Sequence[float], cost: WindowCost) -> list[Alternative]:
-    """Return all admissible placements of two models with their predicted windows, the fastest first."""
+    """Return all admissible placements of two models with the predicted time of a window [s], the fastest first.
+
+    Args:
+        ranks: Number of ranks and allowed placements, from the input.
+        speeds: Relative speed of each rank, 1 for the reference.
+        cost: Predicted cost of a window of both models.
+    """
     candidates = [Alternative(item, window_seconds(item, speeds, cost)) for item in _admissible(ranks, speeds)]
     return sorted(candidates, key=lambda item: item.seconds)
 

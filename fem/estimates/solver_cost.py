@@ -122,7 +122,12 @@ def _explicit_cost(elements: int, nodes: int, steps: int, rate: float) -> Solver
 
 
 def implicit_cost(nodes: tuple[int, int, int], steps: int) -> SolverCost:
-    """Predict the cost of implicit steps of a box with nodes ``(nx, ny, nz)``: one factorisation, a solve per step."""
+    """Predict time and memory of implicit steps of a box: one factorisation, and a solve per step.
+
+    Args:
+        nodes: Number of nodes along x, y and z.
+        steps: Number of time steps.
+    """
     factor, equations = box_factor(nodes), 3 * math.prod(nodes)
     setup = factor.operations / FACTOR_RATE + ASSEMBLY_SECONDS * equations
     step = factor.entries / SOLVE_RATE + IMPLICIT_UPDATE * math.prod(nodes) + IMPLICIT_OVERHEAD
@@ -131,14 +136,19 @@ def implicit_cost(nodes: tuple[int, int, int], steps: int) -> SolverCost:
 
 
 def cooling_cost(elements: int, yielding: int) -> SolverCost:
-    """Predict the cost of the residual stress of hexahedra, some of them yielding: one factorisation and its solves."""
+    """Predict time and memory of computing residual stress: one factorisation and its solves.
+
+    Args:
+        elements: Number of hexahedra.
+        yielding: Number of them whose material may yield.
+    """
     solutions = COOLING_SOLUTIONS if yielding else 1
     cost = implicit_cost(plate_nodes(elements), solutions)
     return replace(cost, seconds=cost.seconds + COOLING_TANGENTS * yielding / TANGENT_RATE)
 
 
 def plate_nodes(elements: int) -> tuple[int, int, int]:
-    """Return the nodes per side of a square plate with a number of hexahedra, the model of a board with package."""
+    """Return the number of nodes along x, y, z of a square plate with a number of hexahedra, as a model of a board."""
     side = max(1, round(math.sqrt(elements / PLATE_LAYERS)))
     return side + 1, side + 1, PLATE_LAYERS + 1
 

@@ -46,7 +46,7 @@ def structure_loads(model: LoadedModel, pulses: Mapping[str, Pulse]) -> list[Loa
 
     Args:
         model: Model on which the loads act.
-        pulses: Pulse of each load by name.
+        pulses: Name of a load -> its pulse over time [s], in SI units of the load.
     """
     return [BUILDERS[type(load)](model, name, load, pulses[name]) for name, load in model.problem.loads.items()]
 

@@ -49,7 +49,7 @@ class JointInterfaceTable:
 
 
 def whole_joint_interface(mesh: MeshData) -> JointInterfaceTable:
-    """Return the pad facets of all joints of an undivided mesh, in the numbers of this mesh.
+    """Return the facets on the package pads of all joints of an undivided mesh, in the numbers of this mesh.
 
     Facets without a solder element are not checked here; ``watch_table`` raises an error for them.
     """

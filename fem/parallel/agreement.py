@@ -13,6 +13,13 @@ Result = TypeVar("Result")
 def agreed(comm: MPI.Comm, work: Callable[[], Result]) -> Result:
     """Run a function on each rank, and raise on all ranks if it fails on any; collective.
 
+    Args:
+        comm: Communicator of the ranks that agree.
+        work: Function without arguments.
+
+    Returns:
+        Result of ``work`` on this rank.
+
     Raises:
         AgreedError: The function failed on some ranks; on every rank, with their messages.
     """

@@ -68,7 +68,13 @@ class Checkpoint:
 
 
 def find_checkpoints(folder: Path, owner: str, preferred: Path) -> list[Checkpoint]:
-    """Return the complete checkpoints of an owner in the subfolders of ``folder``, best first."""
+    """Return the complete checkpoints of an owner in the subfolders of ``folder``, best first; nothing is written.
+
+    Args:
+        folder: Folder with one subfolder for each input and partition.
+        owner: Digest of the inputs to which a checkpoint must belong.
+        preferred: Subfolder of the current partition.
+    """
     by_checkpoint: dict[tuple[Path, int, int], dict[int, Header]] = {}
     for path in sorted(folder.glob("*/state-*")):
         name = STATE_NAME.fullmatch(path.name)
@@ -100,15 +106,15 @@ def warn(message: str) -> None:
 
 
 def write_state(path: Path, header: Header, state: object) -> None:
-    """Write a state with its header."""
+    """Write a header and a state, a tree of plain values and arrays, to the file ``path``."""
     write_data(path, fields_of(header), state)
 
 
 def digest_of(content: bytes) -> str:
-    """Return the SHA-256 digest of some bytes."""
+    """Return the hexadecimal SHA-256 digest of some bytes."""
     return hashlib.sha256(content).hexdigest()
 
 
 def digest_of_files(*paths: Path) -> tuple[str, ...]:
-    """Return the SHA-256 digest of each file."""
+    """Return the hexadecimal SHA-256 digest of the content of each file, in the order of the arguments."""
     return tuple(digest_of(path.read_bytes()) for path in paths)

@@ -155,17 +155,17 @@ def _map_state(state: "State | Entry", change: Callable[[Entry], Any]) -> Any:
 
 
 def values(state: State) -> dict[str, Any]:
-    """Return the tree of values, the argument of ``restore``."""
+    """Return a state as nested dictionaries of plain values without entries, the argument of ``restore``."""
     return _map_state(state, lambda entry: entry.value)
 
 
 def blank(state: State) -> State:
-    """Return an empty state for the same nodes and cells."""
+    """Return a state with empty entries for the same nodes and cells, to be filled by ``take``."""
     return _map_state(state, lambda entry: entry.blank())
 
 
 def layout(state: State) -> str:
-    """Return a digest of the nodes and cells of a state."""
+    """Return a hexadecimal digest of the node and cell numbers of a state, equal only for equal partitions."""
     digest = hashlib.sha256()
     for entry in _leaves(state):
         digest.update(entry.layout)

@@ -128,7 +128,9 @@ def rank_order(
         own_rank: This rank.
 
     Returns:
-        Nodes (m,), pointer (m + 1,) and sources (-1 for this rank) of ``kernels.motion.sum_in_rank_order``.
+        Shared nodes in ascending order, shape (m,); pointers, shape (m + 1,), to the range of sources of each node; and
+        sources: index of a received row or -1 for this rank's own value, by ascending rank, shape (k + m,). They are
+        arguments of ``kernels.motion.sum_in_rank_order``.
     """
     nodes = np.unique(rows)
     node = np.concatenate([rows, nodes])

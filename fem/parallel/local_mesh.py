@@ -57,7 +57,7 @@ class LocalMesh:
 
 
 def positions(haystack: NDArray[np.integer], needles: NDArray[np.integer]) -> NDArray[np.int32]:
-    """Return the position of each needle in the haystack of unique numbers, -1 if it is missing."""
+    """Return the index of each needle, shape (k,), in unique numbers in any order, shape (n,), or -1 if missing."""
     if not len(haystack):
         return np.full(np.shape(needles), -1, np.int32)
     order = np.argsort(haystack)

@@ -14,5 +14,5 @@ OTHER_MPI_JOB = (
 
 
 def without_mpi_job(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return an environment without the variables of the MPI job that this process may belong to."""
+    """Return a copy of environment variables without those of an MPI job, so that a child can start its own job."""
     return {name: value for name, value in environment.items() if not name.startswith(OTHER_MPI_JOB)}

@@ -9,7 +9,7 @@ from reflowshock.problem import Problem
 
 
 def problems(shock: Shock) -> list[Problem]:
-    """Return the contradictions of a drop shock, found before anything is meshed or computed."""
+    """Return the contradictions between parameters of a drop shock, empty if there are none; nothing is computed."""
     return [
         *_pulse(shock),
         *_beyond_the_end(shock),

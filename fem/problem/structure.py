@@ -144,7 +144,12 @@ class LayerCoupling(Coupling):
 
 
 def fine_layers(coupling: LayerCoupling, steps: Mapping[str, float]) -> tuple[str, ...]:
-    """Return the names of the fine layers, from the critical steps of all layers [s]."""
+    """Return the names of the fine layers, which form the meso model.
+
+    Args:
+        coupling: Coupling settings, which may name the layers.
+        steps: Layer name -> critical step [s].
+    """
     return coupling.fine or tuple(name for name, step in steps.items() if step < FINE_STEP * max(steps.values()))
 
 

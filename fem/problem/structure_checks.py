@@ -26,7 +26,7 @@ COUPLING = "dynamics.coupling"
 
 
 def problems(problem: StructureProblem) -> list[Problem]:
-    """Return the contradictions of a structure problem, found before anything is meshed or computed."""
+    """Return the contradictions between parameters of a structure, empty if there are none; nothing is computed."""
     return [
         *_structure(problem),
         *attachment_problems(problem),

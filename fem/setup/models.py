@@ -63,7 +63,12 @@ class DividedModels(Generic[TablesT_co]):
 
 
 def treatment_of(request: RunInput | StructureInput, mass_scaled_step: float | None = None) -> Treatment:
-    """Return the element formulation, kinematics and mass scaling of a run, with the largest mass-scaled step [s]."""
+    """Return the element formulation, kinematics and mass scaling of a run.
+
+    Args:
+        request: Input of the run.
+        mass_scaled_step: Largest critical step after mass scaling [s]; None sets no limit.
+    """
     numerics = request.numerics
     return Treatment(request.formulation, request.kinematics, numerics.mass_scaled, mass_scaled_step or np.inf)
 
