@@ -118,10 +118,10 @@ def run(
 ) -> None:
     """Run all stages that are missing, stale or damaged; ends with the verdict on the design."""
     from reflowshock.workflow.jobs.batch import machine_of
-    from reflowshock.workflow.package.verdict import FAIL
     from reflowshock.workflow.pipeline.gate import ask_if_long
     from reflowshock.workflow.plan import predicted_seconds, show_plan
     from reflowshock.workflow.run import WHAT, run_case
+    from reflowshock.workflow.verdict.criterion import FAIL
 
     store, point = _load(case, settings, out, oversubscribe or executor != ExecutorName.LOCAL, force)
     if until not in point.case.pipeline.names:

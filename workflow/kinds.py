@@ -115,6 +115,12 @@ def _conclude_drop(run_folder: Path, case: BoardDropCase, summary: dict, errors:
     conclude(run_folder, case, summary, errors)
 
 
+def _conclude_structure(run_folder: Path, case: StructureCase, summary: dict, errors: Discretisation) -> None:
+    from reflowshock.workflow.verdict.verdict import verdict_of_structure
+
+    summary["verdict"] = verdict_of_structure()
+
+
 def _structure_report(run_folder: Path, case: StructureCase, context: dict, summary: dict) -> None:
     from reflowshock.workflow.structure.report import add_structure
 
@@ -251,6 +257,7 @@ STRUCTURE = Kind(
     report=_structure_report,
     study=_structure_study,
     effects=STRUCTURE_EFFECTS,
+    conclude=_conclude_structure,
 )
 KINDS = (
     BOARD_DROP,

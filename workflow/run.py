@@ -18,7 +18,7 @@ from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import discard
 from reflowshock.workflow.store.state import StageState, examine, failed_checks, why_stale
 from reflowshock.workflow.store.store import TRACEBACK, Store
-from reflowshock.workflow.store.view import adopt, altered_files, remove_all_links, remove_unused
+from reflowshock.workflow.store.view import adopt, altered_files, list_program_files, remove_all_links, remove_unused
 
 WHAT = "run"  # kind of content in the mark of a run folder
 REPORT = "report"
@@ -47,9 +47,10 @@ def run_case(store: Store, point: Point, until: str, machine: Machine, *, force:
         Whether the run is complete and healthy, and the verdict, empty without a report or without limits in the case.
 
     Raises:
-        CaseError: The folder belongs to something else or is not writable.
+        CaseError: The folder belongs to something else, is not writable, or contains an input of the case.
         RunFolderBusy: Another process is running in the folder.
     """
+    _check_inputs(store, point)
     with lock_folder(store.folder, WHAT, point.case.case.name, force) as lock:
         states = examine(store, point)
         required = {stage.name: states[stage.name] for stage in point.case.pipeline.upstream(until)}
@@ -71,13 +72,23 @@ def run_case(store: Store, point: Point, until: str, machine: Machine, *, force:
     return Ended(not failures, _conclude(store, point) if until == REPORT else "")
 
 
+def _check_inputs(store: Store, point: Point) -> None:
+    """Raise CaseError if an input file of the case is a product in its own run folder, which the run would replace."""
+    folder, own = store.folder.resolve(), list_program_files(store, store.folder)
+    inside = {key: path for key, path in point.case.files.items() if path.resolve().is_relative_to(folder)}
+    for key, path in inside.items():
+        if path.resolve().relative_to(folder).as_posix() in own:
+            message = "lies in the folder of this run, which replaces it; choose another --out"
+            raise CaseError(point.case.case.name, [Problem(key, message, str(path))])
+
+
 def _conclude(store: Store, point: Point) -> str:
     """Print the path of the report, its warnings and its answer; return the verdict on the design."""
     console.print(f"report: {store.folder / 'report.html'}")
     summary = read_json(store.product(point, REPORT) / "summary.json")
     for warning in summary.get("warnings", ()):
         console.print(style_text("[bold yellow]warning:[/] {}", warning), soft_wrap=True)
-    if "verdict" not in summary:
+    if "answer" not in summary:
         return ""
     design = summary["verdict"]["design"]
     console.print(style_text(f"[bold {COLOURS[design]}]{{}}[/]", summary["answer"]), soft_wrap=True)

@@ -17,7 +17,12 @@ from reflowshock.workflow.kinds import kind_of
 
 
 def stage_function(case: Case, name: str) -> StageFunction:
-    """Return the function of a stage of a case."""
+    """Return the function that makes the product of a stage: it takes a run and a folder and returns findings.
+
+    Args:
+        case: Case, whose kind decides on the function.
+        name: Name of the stage.
+    """
     return report if name == "report" else kind_of(case).stages[name]
 
 

@@ -209,25 +209,28 @@ class RayleighEffect(DropEffect):
 
 
 class Failing(DropEffect):
-    """Failure criteria of joints."""
+    """Failure criteria of joints and board."""
 
     name = "failure"
-    adds = "peel stress, von Mises stress and plastic work at each pad against limits"
+    adds = "loads of joints and board against limits or a reference design"
     number = "value / limit"
     threshold = 1.0
     influence = "none: joints are judged, not broken"
-    implementation = "reflowshock.workflow.package.verdict.verdict_of"
-    switch = "shock.failure.*.limit, each with its source, or none"
+    implementation = "reflowshock.workflow.verdict.verdict.verdict_of"
+    switch = (
+        "shock.failure.*.limit, each with its source; shock.failure.board_deflection.apply; shock.failure.reference"
+    )
     source = "JESD22-B111"
 
     @staticmethod
     def by_limits(failure: Failure) -> Decision:
-        """Decide whether failure is assessed: if any measure has a limit. Assessment changes no result."""
-        why = "limits of " + " and ".join(name.replace("_", " ") for name in failure.limits)
-        return decision(bool(failure.limits), why if failure.limits else "shock.failure gives no limit", 0.0)
+        """Decide whether failure is assessed: if any criterion is on. Assessment changes no result."""
+        why = "judges " + ", ".join(name.replace("_", " ") for name in failure.judged)
+        none = "shock.failure gives no limit, and shock.failure.board_deflection.apply = off"
+        return decision(bool(failure.judged), why if failure.judged else none, 0.0)
 
     def decide(self, drop: Drop) -> Decision:
-        """Decide by the limits of the case."""
+        """Decide by the criteria of the case."""
         return self.by_limits(drop.shock.failure)
 
 

@@ -95,8 +95,8 @@ class RunInput(PackageInput, BoardFittings):
 
     @property
     def computed(self) -> str:
-        """JSON text of all parameters that the results depend on, without output paths and ranks."""
-        shock: Any = {"ranks": True, "numerics": UNRELATED}
+        """JSON text of all parameters that the results depend on, without output paths, ranks and failure limits."""
+        shock: Any = {"ranks": True, "numerics": UNRELATED, "failure": True}
         return self.model_dump_json(exclude={"output": True, "checkpoints": True, "cooling": True, "shock": shock})
 
     @property

@@ -115,7 +115,10 @@ def lies_within_hole(surface: int, centres: Iterable[tuple[float, float]], diame
 
 
 def check_elements(name: str) -> None:
-    """Check that no volume element of the current Gmsh mesh is inverted; ``name`` appears in the message.
+    """Check that no volume element of the current Gmsh mesh is inverted.
+
+    Args:
+        name: Name of the mesh for the message.
 
     Raises:
         ValueError: The smallest scaled Jacobian is not positive.

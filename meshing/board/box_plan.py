@@ -108,7 +108,7 @@ class Box:
 
 
 def box_plan(box: Box) -> Plan:
-    """Divide the box along x and y into equal cells, except for the squares around holes."""
+    """Divide the box along x and y into intervals with equal cells, except for the squares around holes."""
     x, y = _axis(box, 0), _axis(box, 1)
     return Plan(x, y, blocks_at(box.holes.places, x, y) if box.holes else frozenset())
 

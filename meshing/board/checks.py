@@ -18,12 +18,15 @@ SMALLEST_ROOM = SMALLEST_INSET * (1.0 + 0.5 * WIDEST_SQUARE)  # hole diameters f
 
 
 def problems(package: Package, board: Board, warpage: Warpage) -> list[Problem]:
-    """Return the contradictions between parameters of an assembly, before it is meshed.
+    """Return the contradictions between parameters of an assembly, before it is meshed; empty if there are none.
 
     Args:
         package: Array, pads and layers of the package.
         board: Sizes, holes and symmetry of the board.
         warpage: Prescribed warpage of the package.
+
+    Returns:
+        Input errors with dotted keys of the case file, allowed ranges and hints.
     """
     return [
         *_array(package),

@@ -60,9 +60,10 @@ class Plan:
 
 
 def board_plan(package: Package, board: Board) -> Plan:
-    """Divide the board into footprint, margin, graded and coarse intervals, and squares around the holes.
+    """Divide the board into footprint, margin, graded and coarse intervals along x and y, and squares around the holes.
 
-    Grid lines follow the footprint of the package and the margin of the meso model's patch.
+    Grid lines follow the footprint of the package and the margin of the meso model's patch. With quarter symmetry only
+    the positive halves of the axes are divided.
     """
     numerics, square = board.numerics, hole_square(board)
     half = (0.5 * package.substrate.length, 0.5 * package.substrate.width)

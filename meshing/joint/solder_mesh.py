@@ -97,7 +97,14 @@ def mesh_bridge(surface: ClosedSurface, sites: Sequence[PadSite], package: Packa
 def mesh_coarse_joint(surface: ClosedSurface, site: PadSite, package: Package, side: Underside) -> JointMesh:
     """Mesh a joint with a few hexahedra of solder, which also replace the copper on its wetted discs.
 
-    Arguments and errors as in ``mesh_joint``.
+    Args:
+        surface: Closed surface in the joint's own frame.
+        site: Positions and sizes of its pads.
+        package: Package with copper and the numerics of coarse joints.
+        side: Underside of the package, which the head of the joint follows.
+
+    Raises:
+        JointMeshError: The joint cannot be swept, a scaled Jacobian is too small, or the errors of ``mesh_joint``.
     """
     overhang = package.copper.thickness if package.copper.layout == "pads" else 0.0
     to_assembly = JointPlace.of(surface, site, side, overhang)

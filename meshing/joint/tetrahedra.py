@@ -72,9 +72,10 @@ def fill_with_tetrahedra(surface: ClosedSurface, size: float, cut_into_patches: 
 
 
 def fill_in_process(surface: ClosedSurface, size: float, cut_into_patches: bool) -> Tetrahedra:
-    """Run ``fill_with_tetrahedra`` in a separate process; same arguments and errors.
+    """Run ``fill_with_tetrahedra`` in a separate process; same arguments, result and errors.
 
-    The mesh then does not depend on earlier calls of Gmsh, and a crash of Gmsh ends only that process.
+    The mesh then does not depend on earlier calls of Gmsh. A crash of Gmsh ends only that process and raises
+    FreeFormError, as does a mesh that takes too long.
     """
     with ProcessPool(1) as pool:
         try:

@@ -62,7 +62,7 @@ class Solution:
 
 
 def to_petsc(matrix: sparse.csr_matrix) -> PETSc.Mat:
-    """Copy a sparse matrix to PETSc."""
+    """Copy a sparse matrix, of any shape, to PETSc on this process (sequential AIJ)."""
     matrix.sort_indices()
     # petsc4py delays the destruction of objects that went out of scope; without this each step would leak its factors.
     PETSc.garbage_cleanup(PETSc.COMM_SELF)
@@ -78,7 +78,10 @@ def to_petsc_spd(matrix: sparse.csr_matrix) -> PETSc.Mat:
 
 
 def factor_cholesky(matrix: sparse.csr_matrix) -> PETSc.KSP:
-    """Return a solver with the Cholesky factors of a symmetric positive definite matrix, by MUMPS."""
+    """Factor a symmetric positive definite matrix by MUMPS and return a solver with its Cholesky factors.
+
+    The solver applies the factors only: ``solve(right, result)`` takes PETSc vectors.
+    """
     solver = PETSc.KSP().create(PETSc.COMM_SELF)
     solver.setOperators(to_petsc_spd(matrix))
     solver.setType(PETSc.KSP.Type.PREONLY)
@@ -128,10 +131,15 @@ def _leak(problem: SaddlePoint, pressure: Floats) -> Floats | float:
 
 
 def solve_saddle_point(problem: SaddlePoint) -> Solution:
-    """Solve by conjugate gradients on the Schur complement, preconditioned with C diag(A)^-1 C^T + S.
+    """Solve A v - C^T p = f and C v + S p = g by conjugate gradients on the Schur complement.
+
+    The preconditioner is C diag(A)^-1 C^T + S.
 
     Args:
-        problem: Saddle-point problem.
+        problem: Matrices A, C and S, and right-hand sides f and g.
+
+    Returns:
+        Velocity v, pressure p and number of iterations.
 
     Raises:
         SolveFailed: The true residual of either equation exceeds the limit.

@@ -21,7 +21,10 @@ Mask = NDArray[np.bool_]
 
 
 def fill_with_tetrahedra(body: Body) -> Indices:
-    """Return tetrahedra between the particles of a body whose boundary is its surface, shape (t, 4)."""
+    """Return tetrahedra between the particles of a body whose boundary is its surface, shape (t, 4).
+
+    Their corners are particle numbers; faces on walls belong to the boundary, too.
+    """
     cells = tetrahedralise(body.points, body.cloud.spacing)
     wall = body.cloud.wall
     cells = cells[~_on_one_wall(wall, cells)]

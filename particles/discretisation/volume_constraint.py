@@ -58,7 +58,10 @@ def solve_volume(problem: SaddlePoint) -> Solution:
     """Solve a problem whose only constraint is the volume; its Schur complement is a number.
 
     Args:
-        problem: Saddle-point problem with one constraint.
+        problem: Saddle-point problem with one constraint and without stabilisation.
+
+    Returns:
+        Velocity, the one pressure, and 0 iterations.
 
     Raises:
         SolveFailed: The true residual of either equation exceeds the limit.

@@ -92,7 +92,10 @@ def mirror_particles(
         points: Particle positions, shape (n, 3) [m].
         plates: Walls.
         reach: Distance from a plate up to which particles are mirrored [m].
-        slip_lengths: Slip length of each plate [m], 0 without slip; free slip by default.
+        slip_lengths: Slip length of each plate [m], 0 without slip; None for free slip on all plates.
+
+    Returns:
+        Positions of the ghosts, the particle that each mirrors, and the reflection of its vectors.
     """
     all_points, source, nothing = points, np.arange(len(points)), np.zeros(0, np.int64)
     reflection = np.tile(np.eye(3), (len(points), 1, 1))

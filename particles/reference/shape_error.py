@@ -35,7 +35,12 @@ def shape_error(points: Floats, triangles: Indices, meridian: Meridian) -> float
 
 
 def distance(points: Floats, meridian: Meridian) -> Floats:
-    """Return the distance of points, shape (n, 3) [m], from the surface of revolution of a meridian, shape (n,) [m]."""
+    """Return the unsigned distances of points from the surface of revolution of a meridian about z, shape (n,) [m].
+
+    Args:
+        points: Points, shape (n, 3) [m].
+        meridian: Exact meridian, r and z.
+    """
     line = np.column_stack((meridian.r, meridian.z))
     projected = np.column_stack((np.hypot(points[:, 0], points[:, 1]), points[:, 2]))
     nearest = cKDTree(line).query(projected)[1]

@@ -53,12 +53,15 @@ def steady_channel(height: Floats, width: float, rate_at_wall: float, viscosity:
 
 
 def taylor_green(x: Floats, y: Floats, side: float) -> tuple[Floats, Floats, Floats]:
-    """Return velocities over their maximum U, and pressure over rho U^2, of vortices (Taylor & Green 1937).
+    """Return the exact initial flow of vortices (Taylor & Green 1937).
 
     Args:
         x: First coordinates, shape (n,) [m].
         y: Second coordinates, shape (n,) [m].
         side: Side of the periodic box [m].
+
+    Returns:
+        Velocities along both axes over their maximum U, and pressure over rho U^2, shape (n,) each.
     """
     wave = 2.0 * pi / side
     u = -np.cos(wave * x) * np.sin(wave * y)

@@ -179,9 +179,15 @@ def stiffness_estimate(geometry: JointGeometry, solder: Solder) -> NDArray[np.fl
 
 
 def axial_force(geometry: JointGeometry, solder: Solder, gap: float) -> float:
-    """Return the axial force on the package [N] of the coaxial Young-Laplace joint at a gap [m].
+    """Return the axial force on the package [N] of the coaxial Young-Laplace joint at a gap, positive upwards.
 
-    The force is NaN if no such joint exists.
+    Args:
+        geometry: Radii of the discs; gap, offset and tilt are ignored.
+        solder: Volume, surface tension and contact angles.
+        gap: Gap [m].
+
+    Returns:
+        Force; NaN if no such joint exists.
     """
     weight = acting_weight(solder, decide_effects(geometry, solder))
     meridian = reference_meridian(replace(geometry, gap=gap, offset=(0.0, 0.0), tilt=(0.0, 0.0)), solder, weight)

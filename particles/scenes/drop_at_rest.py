@@ -62,6 +62,9 @@ def drop_to_rest(
         progress: Function called with the fraction done, 0 to 1.
         checkpoint: File from which the run continues, to the last bit, and to which it saves its state.
 
+    Returns:
+        Shape with history and metrics, decisions on the effects, and exact meridian (None without one).
+
     Raises:
         NotAtRest: The drop is not at rest after ``solder.numerics.max_steps``.
         SolveFailed: A linear solve failed.

@@ -29,9 +29,12 @@ def start_flow(cloud: Cloud, solder: Solder, effects: Mapping[str, bool], lines:
 
     Args:
         cloud: Particles of the liquid.
-        solder: Fluid properties and numerics.
+        solder: Fluid properties and numerics, which select the step solver.
         effects: Name -> on or off; missing effects are off.
-        lines: Contact lines, one per ring of the cloud.
+        lines: Contact lines, one per ring of the cloud; empty for a free drop.
+
+    Returns:
+        Flow at time 0, with body, physics, step solver and time step.
     """
     largest, bound = largest_step(solder, cloud.spacing)
     time_step = TimeStep(largest, cloud.spacing, largest, bound, bound)
@@ -92,7 +95,7 @@ def stop_rule(cloud: Cloud, solder: Solder, effects: Mapping[str, bool], angle: 
         cloud: Particles of the liquid.
         solder: Fluid, process and numerics.
         effects: Name -> on or off; missing effects are off.
-        angle: Contact angle of the spherical cap that oscillates as slowly as the body [rad]: the contact angle of a
+        angle: Contact angle [rad] of the spherical cap that oscillates as slowly as the body: the contact angle of a
             drop on a uniform wall; the default for a body that edges or friction hold; None for a free drop.
     """
     calm_time = CALM_CAPILLARY_TIMES * capillary_limit(solder.density, cloud.spacing, solder.surface_tension)

@@ -58,6 +58,10 @@ def joint_to_rest(
         checkpoints: Function of the number of a target of the path that returns its checkpoint; joints without a path
             use number 0.
 
+    Returns:
+        Final shape with history and metrics, decisions on the effects, exact meridian (None without one), and the
+        position and metrics at each target of a path.
+
     Raises:
         TooLittleSolder: The volume does not span the gap.
         NotAtRest: The joint is not at rest after ``solder.numerics.max_steps``.

@@ -83,7 +83,7 @@ def read_body(folder: Path) -> tuple[JointShape, np.ndarray | None]:
 
 
 def read_shapes(path: Path | str) -> dict[str, JointShape]:
-    """Read the file of ``write_shapes``: name -> shape."""
+    """Read the HDF5 file of ``write_shapes``: name -> shape; timings are not in the file."""
     with h5py.File(path, "r") as file:
         return {name: _read_shape(group) for name, group in file.items()}
 
@@ -151,7 +151,7 @@ def write_flow(folder: Path, result: FlowResult) -> None:
 
 
 def read_flow(folder: Path) -> FlowResult:
-    """Read the file ``flow.h5`` of ``write_flow``."""
+    """Read the file ``flow.h5`` of ``write_flow`` in a folder; timings and texts are not in the file."""
     with h5py.File(folder / FLOW, "r") as file:
         pictures = [
             Picture(float(item.attrs["time"]), item["points"][()], item["velocity"][()], item["pressure"][()])

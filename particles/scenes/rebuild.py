@@ -43,7 +43,7 @@ FlowAndRun = tuple[LiquidFlow, Run]
 
 
 def touch(first: Body, second: Body) -> bool:
-    """Return whether vertices of two free surfaces are within a spacing of each other."""
+    """Return whether the free surfaces of two bodies touch: vertices are within about a spacing of each other."""
     reach = CONTACT_SPACINGS * min(first.cloud.spacing, second.cloud.spacing)
     surfaces = [body.points[: body.cloud.surface_count] for body in (first, second)]
     distance, _ = cKDTree(surfaces[0]).query(surfaces[1], distance_upper_bound=reach)

@@ -138,7 +138,10 @@ class PreparedSectionStep(PreparedIspgStep):
 
 
 def admissible_basis(body: Body) -> sparse.csr_matrix:
-    """Return a basis of the velocities within the plane, along walls and along the axis, shape (3 n, d)."""
+    """Return a basis of the velocities within the plane, along walls and along the axis, as columns, shape (3 n, d).
+
+    Rows are ordered by particle; d is the number of degrees of freedom.
+    """
     free = np.ones((len(body.points), 3), bool)
     free[:, 1] = False
     free[body.cloud.wall >= 0, 2] = False

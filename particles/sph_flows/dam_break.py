@@ -41,7 +41,11 @@ def solve_dam_break(
 
 
 def dam(scene: DamBreak) -> Simulation:
-    """Set up the column at rest under the pressure of its weight, in a tank without a lid, 4 columns high."""
+    """Set up the column at rest under the pressure of its weight, in a tank without a lid, 4 columns high.
+
+    Returns:
+        Simulation at time 0, to be advanced by ``run_flow``.
+    """
     law = flow.law_of(scene, (0.0, 0.0, 0.0), (0.0, 0.0, -scene.gravity), has_surface=True)
     liquid = column_points(scene)
     pressure = scene.density * scene.gravity * (scene.height - liquid[2])

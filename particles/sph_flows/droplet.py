@@ -84,7 +84,11 @@ def follow(
 
 
 def droplet(scene: Droplet) -> Simulation:
-    """Set up the particles and their surface, whose tension balances the pressure of a sphere."""
+    """Set up the particles of a droplet and their surface, whose tension balances the pressure of a sphere.
+
+    Returns:
+        Simulation at time 0, with the impact speed if there is one.
+    """
     points, triangles, spacing = start_shape(scene, EDGE)
     law, tension = liquid_of(scene, spacing)
     fields = flow.make_fields(points, np.empty((3, 0)), np.zeros(points.shape[1]), law)

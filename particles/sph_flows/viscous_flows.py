@@ -53,7 +53,11 @@ def solve_poiseuille(
 
 
 def channel(scene: Poiseuille) -> Simulation:
-    """Set up liquid at rest between two plates."""
+    """Set up liquid at rest between two plates, periodic along x and driven by a constant force.
+
+    Returns:
+        Simulation at time 0, to be advanced by ``run_flow``.
+    """
     law = flow.law_of(scene, (scene.columns * scene.spacing, 0.0, 0.0), (scene.force, 0.0, 0.0), has_surface=False)
     liquid, walls = channel_points(scene), plate_points(scene, flow.wall_layers(scene))
     fields = flow.make_fields(liquid, walls, np.zeros(liquid.shape[1]), law)
@@ -96,7 +100,11 @@ def solve_taylor_green(
 
 
 def vortices(scene: TaylorGreen) -> Simulation:
-    """Set up the vortices in a periodic box."""
+    """Set up the vortices of a scene in a periodic box without walls.
+
+    Returns:
+        Simulation at time 0, with the exact initial velocities and pressures.
+    """
     law = flow.law_of(scene, (scene.side, 0.0, scene.side), (0.0, 0.0, 0.0), has_surface=False)
     liquid = box_points(scene)
     u, w, pressure = exact.taylor_green(liquid[0], liquid[2], scene.side)

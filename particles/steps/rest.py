@@ -283,9 +283,9 @@ def is_lasting(records: Sequence[StepRecord], calm: int, rule: StopRule) -> bool
     """Return whether a calm body is at rest: calm for three steps and for the time that the rule requires.
 
     Args:
-        records: Records of the steps.
+        records: Records of all steps so far, in order.
         calm: Number of consecutive calm steps at the end.
-        rule: Criteria of rest.
+        rule: Criteria of rest, with the required time.
     """
     return calm >= CALM_STEPS and sum(record.time_step for record in records[-calm:]) >= rule.lasting
 

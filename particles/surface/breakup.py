@@ -50,7 +50,8 @@ def with_contact_lines(triangles: Indices) -> tuple[Indices, Indices, tuple[Indi
         triangles: Triangles, shape (t, 3).
 
     Returns:
-        Old vertex of each new one, shape (k,), triangles of new vertices, shape (t, 3), and contact lines.
+        Old vertex of each new one, shape (k,), triangles of new vertices, shape (t, 3), and the vertices along each
+        contact line.
 
     Raises:
         CannotRebuild: More than two triangles meet in an edge.

@@ -209,8 +209,12 @@ def cover_dry_spots(
 def triangulate(level: LevelSet, has_wall: bool) -> tuple[Floats, Indices, tuple[Indices, ...]]:
     """Triangulate the zero level of a level set, above the wall z = 0 if there is one.
 
+    Args:
+        level: Level set, negative in the liquid.
+        has_wall: Whether the surface is cut at the wall.
+
     Returns:
-        Vertices (m, 3) [m], triangles (t, 3) and contact lines.
+        Vertices (m, 3) [m], outward oriented triangles (t, 3) and contact lines, shape (k,) each.
 
     Raises:
         CannotRebuild: Contact lines meet in a point.
@@ -294,7 +298,14 @@ def is_folded(points: Floats, triangles: Indices, spacing: float) -> bool:
 
 
 def is_worn(points: Floats, triangles: Indices, rings: Sequence[Indices], spacing: float) -> bool:
-    """Return whether triangles are too small, too large or slivers, or a surface without contact lines is folded."""
+    """Return whether triangles are too small, too large or slivers, or a surface without contact lines is folded.
+
+    Args:
+        points: Vertices, shape (m, 3) [m].
+        triangles: Outward oriented triangles, shape (t, 3).
+        rings: Contact lines; empty for a closed surface.
+        spacing: Particle spacing, to which the size of triangles is compared [m].
+    """
     if not rings and is_folded(points, triangles, spacing):
         return True
     corner = points[triangles]

@@ -43,6 +43,8 @@ def test_different_results_are_printed_with_their_change(two_runs, tmp_path):
     done = compare(first, other, "--out", page)
     assert done.returncode == 0, done.stderr
     assert "peel stress" in done.stdout and "(+25 %)" in done.stdout and "all parameters are equal" in done.stdout
+    ratio = next(line for line in done.stdout.splitlines() if "peel stress relative to" in line)
+    assert "1.25" in ratio
     text = page.read_text()
     assert "(+25 %)" in text and "(+100 %)" in text and text.count("data-figure=") == 1
     assert compare(first, other, "--out", page).returncode == 0  # a page of this command is overwritten

@@ -35,14 +35,18 @@ from reflowshock.fem.statics.plates import RigidPlates
 from reflowshock.fem.statics.structure import ThermalStructure
 from reflowshock.materials.library import FR4, SAC305, SILICON
 from reflowshock.materials.plasticity import plastic_constants
+from reflowshock.parameters import with_value
 from reflowshock.particles.parameters.effect_gravity import NEGLIGIBLE_SHAPE_CHANGE
 from reflowshock.particles.parameters.effects import LIQUID_EFFECTS, decide, decide_drop, drop_numbers
 from reflowshock.particles.parameters.solder import SolderEffects
 from reflowshock.workflow.board_drop.fine_joints import needs_coarse_joints
+from reflowshock.workflow.case.case import CASES
 from reflowshock.workflow.effects.registry import registry
-from reflowshock.workflow.package.verdict import verdict_of
+from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.reflow.between import open_structure
 from reflowshock.workflow.reflow.forecast import load_steps
+from reflowshock.workflow.verdict.criterion import JudgedDrop
+from reflowshock.workflow.verdict.verdict import verdict_of
 from tests.support import effect_switches as scene
 from tests.support.drops import solve_drop
 from tests.support.effect_switches import ELSEWHERE_OFF, ELSEWHERE_ON
@@ -373,7 +377,7 @@ def _(_effect, _folder):
 
 @off("failure")
 def _(_effect, _folder):
-    assert not Failing.by_limits(Failure())["on"]
+    assert not Failing.by_limits(Failure.model_validate({"board_deflection": {"apply": "off"}}))["on"]
 
 
 @on("failure")
@@ -381,8 +385,10 @@ def _(_effect, _folder):
     """The verdict does not change the history."""
     rng = np.random.default_rng(0)
     arrays = {name: rng.random((5, 2)) for name in ("peel_board", "peel_package")} | {"joints": np.array(["A1", "B1"])}
-    arrays["time"] = np.arange(5.0)
+    arrays |= {"time": np.arange(5.0), "board_centre": np.zeros((5, 3))}
     before = {name: value.copy() for name, value in arrays.items()}
     limit = {"peel_stress": {"limit": 1e9, "source": "none breaks"}}
-    assert verdict_of(Failure.model_validate(limit), arrays, "A1")["design"] == "PASS"
+    case = read_case(CASES / "jedec_bga/case.toml", oversubscribe=True)
+    case = with_value(case, "shock.failure", Failure.model_validate(limit))
+    assert verdict_of(JudgedDrop(case, {}, arrays))["design"] == "PASS"
     assert all(np.array_equal(arrays[name], before[name]) for name in arrays)

@@ -221,7 +221,7 @@ def show(request: AccuracyRequest, out: Path | None, console: Console) -> bool:
 
 
 def is_within_tolerance(accuracy: Accuracy) -> bool:
-    """Return whether the recommendation was run and its measured error is within the tolerance."""
+    """Return whether the recommended settings were run and their measured error is within the user's tolerance."""
     chosen = accuracy.recommended
     if chosen is None or chosen.found is None or accuracy.judged not in chosen.found.errors:
         return False

@@ -30,11 +30,17 @@ def first_mode(case: "BoardDropCase") -> tuple[float, float]:
 
     Fitted masses are placed at the middle, where they lower the frequency most.
     """
-    board, (young_x, young_y, _) = case.board, case.materials.board.engineering_constants.young
-    length, young = max(zip(spans(board), (young_x, young_y), strict=True))
+    board, axis = case.board, bending_axis(case)
+    length, young = spans(board)[axis], case.materials.board.engineering_constants.young[axis]
     density = case.materials.board.density + 2.0 * fitted_mass(case) / (board.length * board.width * board.thickness)
     stiffness = young * board.thickness * board.thickness / 12.0 / density
     return length, (math.pi / length) ** 2 * math.sqrt(stiffness)
+
+
+def bending_axis(case: "BoardDropCase") -> int:
+    """Return the axis that the first mode bends along, 0 for x or 1 for y: the holes are farther apart along it."""
+    young = case.materials.board.engineering_constants.young
+    return max((0, 1), key=lambda axis: (spans(case.board)[axis], young[axis]))
 
 
 def fitted_mass(case: "BoardDropCase") -> float:

@@ -184,7 +184,12 @@ def turns(case: "BoardDropCase", part: str) -> bool:
 
 
 def is_linear_part(case: "BoardDropCase", part: str) -> bool:
-    """Return whether a part is elastic with small rotations."""
+    """Return whether the forces of a part are linear: elastic material and small rotations.
+
+    Args:
+        case: Case with decided kinematics.
+        part: Name of the part.
+    """
     return case.shock.numerics.kinematics == "small" and material_of(case, part).plasticity is None
 
 
@@ -203,5 +208,5 @@ def is_box(part: str) -> bool:
 
 
 def material_of(case: "BoardDropCase", part: str) -> Material:
-    """Return the material of a part."""
+    """Return the material of a part of the mesh, by the role in its name."""
     return getattr(case.materials, role_of(part))

@@ -9,7 +9,7 @@ from reflowshock.workflow.board_drop.board_deflection import decided
 from reflowshock.workflow.board_drop.forecast import step_problems
 from reflowshock.workflow.case import fields
 from reflowshock.workflow.case.pulse_files import unreadable_pulses
-from reflowshock.workflow.package import given_surfaces
+from reflowshock.workflow.package import given_surfaces, reference
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase, joint_geometries
 from reflowshock.workflow.reflow import forecast as reflow_forecast
 
@@ -36,6 +36,7 @@ def board_drop_problems(case: BoardDropCase) -> list[Problem]:
     problems = _of_joints(case) + _in_user_units(case, shock_checks.problems(case.shock))
     problems += fine_joints.problems(case)
     problems += unreadable_pulses(case.pulse_tables)
+    problems += reference.problems(case.shock.failure.reference, type(case))
     problems += _in_user_units(case, fittings.problems(case))
     if case.shock.numerics.kinematics == "auto" and not problems:
         problems += _in_user_units(case, map(_as_decided, shock_checks.problems(decided(case).shock)))

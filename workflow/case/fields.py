@@ -23,7 +23,14 @@ BOUNDS: tuple[tuple[type, str, str], ...] = (
 
 
 def quantity_of(field: FieldInfo) -> Quantity | None:
-    """Return the quantity of a field, or of the items of its list; None for numbers, names, tables."""
+    """Return the physical quantity (dimension and user's unit) of a model field, or of the items of its list.
+
+    Args:
+        field: Field of a parameter model (pydantic).
+
+    Returns:
+        Quantity; None for numbers, names and tables.
+    """
     return next((item for item in _metadata(field) if isinstance(item, Quantity)), None)
 
 
@@ -79,7 +86,7 @@ def alternatives(field: FieldInfo) -> tuple[FieldInfo, ...]:
 
 
 def allowed(field: FieldInfo) -> str:
-    """Describe the allowed values of a field: names, or a range in the user's unit."""
+    """Describe the allowed values of a field as text: names, or a range in the user's unit; empty if unlimited."""
     kinds = alternatives(field)
     if len(kinds) > 1:
         return ", or ".join(", ".join(literal_names(kind)) or allowed(kind) or "a list of names" for kind in kinds)
@@ -197,7 +204,12 @@ def leaves(parameters: BaseModel, prefix: str = "") -> Iterator[tuple[str, objec
 
 
 def display(value: object, field: FieldInfo) -> str:
-    """Write an SI value as a user would in a case file, without quotes."""
+    """Write an SI value as text in the user's unit, as in a case file but without quotes.
+
+    Args:
+        value: Value of a parameter; tuples are written as lists.
+        field: Field of the value, which gives its quantity.
+    """
     quantity = quantity_of(field)
     if quantity is not None and isinstance(value, float):
         return quantity.text(value)

@@ -14,7 +14,10 @@ Name = Annotated[str, Field(pattern=NAME)]
 
 
 def is_name(text: object) -> bool:
-    """Return whether a value is a valid name of a user-defined table: a text that matches ``NAMES``."""
+    """Return whether a value is a valid name of a case or a user-defined table.
+
+    Valid names have up to 64 letters, digits, ``_``, ``.`` or ``-`` and start with a letter or digit.
+    """
     return isinstance(text, str) and _NAME.fullmatch(text) is not None
 
 

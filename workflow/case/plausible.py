@@ -44,6 +44,7 @@ BY_DIMENSION = {
     "frequency": Range("1e-6 Hz", "1e12 Hz"),
     "irradiance": Range("1e-3 W/m^2", "1e12 W/m^2"),
     "angle": Range("1e-9 rad", "1 turn"),
+    "pure number": Range("1e-3 um/m", "1e6 um/m"),  # a strain
 }
 # Narrower ranges by the last name of a key.
 BY_NAME = {

@@ -96,13 +96,13 @@ def against_limit(name: str, check: dict) -> tuple[str, str]:
 
 
 def duration(seconds: float) -> str:
-    """Format a wall time with two digits in a readable unit."""
+    """Format a wall time [s] with two digits in a readable unit: s, min, h or days."""
     units = ((1.0, "s"), (60.0, "min"), (3600.0, "h"))
     size, unit = next(((s, u) for s, u in units if seconds < 100.0 * s), (86400.0, "days"))
     return f"{seconds / size:.2g} {unit}" if seconds < 100.0 * size else f"{seconds / size:.0f} {unit}"
 
 
 def short(seconds: float) -> str:
-    """Format a time step in a readable unit."""
+    """Format a time step [s] with three digits in ns, µs or ms."""
     factor, unit = next(((f, u) for f, u in ((1e9, "ns"), (1e6, "µs")) if f * seconds < 1e3), (1e3, "ms"))
     return f"{factor * seconds:.3g} {unit}"

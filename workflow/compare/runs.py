@@ -18,6 +18,8 @@ from reflowshock.workflow.pipeline.points import read_case_of_run
 from reflowshock.workflow.pipeline.report import collect_summary
 from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.report.tables import named_quantity
+from reflowshock.workflow.verdict.criteria import BY_NAME
+from reflowshock.workflow.verdict.ratios import RATIOS, ratio_of
 
 MODES = ("two_scale", "dns", "explicit", "implicit")  # the first mode of a run is compared
 NONE = "–"
@@ -116,7 +118,7 @@ def results(runs: Sequence[ComparedRun]) -> dict:
         for name in names
         if any(name in run_metrics for run_metrics in metrics)
     ]
-    return _table("result", runs, [*_verdicts(runs), *rows])
+    return _table("result", runs, [*_verdicts(runs), *_ratios(runs), *rows])
 
 
 def select_differing(table: Mapping[str, Any]) -> dict:
@@ -157,7 +159,7 @@ def _stress(metric: Mapping[str, Any]) -> str:
 
 
 def _verdicts(runs: Sequence[ComparedRun]) -> list[list[str]]:
-    """Return the rows of health, verdict and smallest margin, if the runs have them."""
+    """Return the rows of health, verdict, deciding criterion and smallest margin, if the runs have them."""
     failed = [
         [name.replace("_", " ") for name, check in run.summary["health"].items() if not check["ok"]] for run in runs
     ]
@@ -167,9 +169,31 @@ def _verdicts(runs: Sequence[ComparedRun]) -> list[list[str]]:
         rows.append(
             ["verdict on the design", *(NONE if verdict is None else verdict["design"] for verdict in verdicts)]
         )
-        margins = [None if verdict is None else verdict["joints"][verdict["joint"]]["margin"] for verdict in verdicts]
+        deciding = [None if verdict is None else _deciding(verdict) for verdict in verdicts]
+        names = [NONE if record is None else BY_NAME[record["name"]].words for record in deciding]
+        margins = [None if record is None else record["margin"] for record in deciding]
+        rows += [["deciding criterion", *names]] if any(deciding) else []
         if any(margin is not None for margin in margins):
             rows.append(["smallest margin", *(NONE if margin is None else f"{margin:.3g}" for margin in margins)])
+    return rows
+
+
+def _deciding(verdict: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """Return the record of the criterion that decides a verdict; None if none applies."""
+    return next((record for record in verdict["criteria"] if record["name"] == verdict["criterion"]), None)
+
+
+def _ratios(runs: Sequence[ComparedRun]) -> list[list[str]]:
+    """Return the rows of load ratios to the first run, as in the verdict against a reference; empty without a drop."""
+    first, *others = [run.summary["metrics"] for run in runs]
+    if "critical_joint" not in first:
+        return []
+    rows = []
+    for name, words in RATIOS.items():
+        values = [ratio_of(name, metrics, first).value for metrics in others]
+        if any(value is not None for value in values):
+            texts = [NONE if value is None else f"{value:.3g}" for value in values]
+            rows.append([f"{words} relative to {runs[0].name}", "1", *texts])
     return rows
 
 

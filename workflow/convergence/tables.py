@@ -79,7 +79,7 @@ def _error(share: float) -> str:
 
 
 def remarks(accuracy: Accuracy) -> list[str]:
-    """Return the remarks of the table of runs, each once, followed by the names of its runs."""
+    """Return the remarks of the table of runs, each once: "remark: names of its runs"."""
     names_of: dict[str, list[str]] = {}
     for row in runs(accuracy)["rows"]:
         names_of.setdefault(row[-1], []).append(row[0].removesuffix(f" {ON_FRONT}"))

@@ -67,5 +67,5 @@ def effects_table(case: Case, effects: Mapping[str, Any], of_what: str) -> Table
 
 
 def show_effects(case: Case, console: Console) -> None:
-    """Print the effects of a case."""
+    """Print the table of a case's effects: on or off, expected influence, share of the predicted cost, why."""
     console.print(effects_table(case, dict(kind_of(case).forecast(case).effects), case.case.name))

@@ -11,5 +11,5 @@ FLOWS = (DAM_BREAK, POISEUILLE, TAYLOR_GREEN, DROPLET, PRINTING)
 
 
 def flow_of(case: FlowCase) -> FlowKind:
-    """Return the kind of flow of a case."""
+    """Return the record of a flow case's kind: its solver, limits, cost and charts."""
     return next(flow for flow in FLOWS if flow.case is type(case))

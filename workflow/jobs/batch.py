@@ -207,7 +207,7 @@ def failure_of(store: Store, point: Point, until: str) -> tuple[str, str] | None
 
 
 def log_of(store: Store, point: Point, stage: str) -> Path:
-    """Return the log file of a job, as named in the Snakefile."""
+    """Return the path of the log file of a job, as named in the Snakefile; it need not exist."""
     return store.home / BATCH / "logs" / f"{job_name(point, stage)}.txt"
 
 

@@ -14,7 +14,7 @@ from reflowshock.particles.parameters.solder import Reflow, Solder
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.stage import Pipeline, Stage, report_of
 from reflowshock.workflow.case.toml_file import resolved_path
-from reflowshock.workflow.package import given_surfaces
+from reflowshock.workflow.package import given_surfaces, reference
 
 if TYPE_CHECKING:
     from reflowshock.meshing.board.pads import PadSite
@@ -198,16 +198,19 @@ class BoardDropCase(PackageCase, BoardFittings):
 
     @classmethod
     def located(cls, table: dict, folder: Path) -> dict:
-        """Resolve surface files and the table of the shock relative to the folder of the case file."""
+        """Resolve surface files, the table of the shock and the reference relative to the folder of the case file."""
         shock = table.get("shock")
-        if isinstance(shock, dict) and isinstance(shock.get("table"), str):
-            shock["table"] = resolved_path(folder, shock["table"])
+        if isinstance(shock, dict):
+            reference.located(shock, folder)
+            if isinstance(shock.get("table"), str):
+                shock["table"] = resolved_path(folder, shock["table"])
         return super().located(table, folder)
 
     @property
     def files(self) -> dict[str, Path]:
-        """Files of joint surfaces and of the table of the shock, by key."""
-        return super().files | {key: path for key, (path, *_) in self.pulse_tables.items()}
+        """Files of joint surfaces, of the table of the shock and of the reference, by key."""
+        tables = {key: path for key, (path, *_) in self.pulse_tables.items()}
+        return super().files | tables | reference.files(self.shock.failure.reference)
 
     @property
     def pulse_tables(self) -> dict[str, tuple[Path, str, str | None]]:

@@ -6,11 +6,13 @@ from pathlib import Path
 from reflowshock.fem.estimates.drop_effects import Failing
 from reflowshock.workflow.board_drop.duration import longest_duration
 from reflowshock.workflow.case.run import metric
-from reflowshock.workflow.package import findings
+from reflowshock.workflow.package import findings, reference
 from reflowshock.workflow.package.case import BoardDropCase
-from reflowshock.workflow.package.verdict import answer, verdict_of
 from reflowshock.workflow.report.errors import Discretisation
 from reflowshock.workflow.report.histories import Arrays, late_peak, read_modes, unsettled
+from reflowshock.workflow.verdict.answer import answer
+from reflowshock.workflow.verdict.criterion import JudgedDrop
+from reflowshock.workflow.verdict.verdict import verdict_of
 
 PEEL = "peel_stress"
 
@@ -26,13 +28,13 @@ def conclude(run_folder: Path, case: BoardDropCase, summary: dict, known: Discre
         known: Discretisation errors of the metrics.
     """
     histories, results = read_modes(run_folder / "shock")
-    critical = summary["metrics"].get("critical_joint")
-    if not histories or critical is None:
+    if not histories or "critical_joint" not in summary["metrics"]:
         return
     main = next(iter(histories))
     summary["effects"][Failing.name] = Failing.by_limits(case.shock.failure)
     coarse = _coarse(results[main], histories[main]["joints"])
-    verdict = verdict_of(case.shock.failure, histories[main], critical["value"], coarse)
+    survivor = reference.metrics_of(case.shock.failure.reference)
+    verdict = verdict_of(JudgedDrop(case, summary["metrics"], histories[main], coarse, survivor))
     if PEEL in known.errors:
         summary["metrics"]["discretisation_error"] = metric(known.errors[PEEL])
     deciding = verdict["joints"][verdict["joint"]]["criterion"]

@@ -16,9 +16,9 @@ from reflowshock.fem.output.ranking import (
     ranking_measure,
 )
 from reflowshock.workflow.case.text import mega, micro, nano, number, percent
-from reflowshock.workflow.package.verdict import WORDS
 from reflowshock.workflow.package_report.joint_records import Column, Record, by_shape, record_table
 from reflowshock.workflow.process.products import read_json
+from reflowshock.workflow.verdict.criteria import BY_NAME
 
 MESH_COLUMNS: tuple[Column, ...] = (
     ("method", "method", str),
@@ -168,7 +168,7 @@ def verdict_cells(judged: Mapping[str, Any]) -> list[str]:
     """
     if judged["margin"] is None:
         return [judged["verdict"], "–"]
-    return [judged["verdict"], f"{judged['margin']:.3g} by {WORDS[judged['criterion']]}"]
+    return [judged["verdict"], f"{judged['margin']:.3g} by {BY_NAME[judged['criterion']].words}"]
 
 
 def meshes(joints: Sequence[Record]) -> dict | None:

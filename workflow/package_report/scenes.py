@@ -99,7 +99,7 @@ def _scene(joints: FieldSeries, whole: FieldSeries, parts: Sequence[str], top: f
 
 
 def role_of(part: str) -> str:
-    """Return the group of a part: a material role or ``other packages``."""
+    """Return the group of a part for the legend: its material role, or ``other packages`` for neighbouring packages."""
     return OTHERS if is_neighbour(part) else next((role for role in ROLES if part.startswith(role)), OTHERS)
 
 

@@ -9,7 +9,6 @@ from reflowshock.fem.output.ranking import ranking_measure
 from reflowshock.workflow.case.text import mega, micro, number, quantity
 from reflowshock.workflow.package import findings
 from reflowshock.workflow.package.case import BoardDropCase
-from reflowshock.workflow.package.verdict import failing, limits_table
 from reflowshock.workflow.package_report import joint_tables
 from reflowshock.workflow.package_report.board import add_board
 from reflowshock.workflow.package_report.headline import headline, later_swings
@@ -17,6 +16,7 @@ from reflowshock.workflow.package_report.joint_records import joint_records
 from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.report import tables
 from reflowshock.workflow.report.histories import MODES, read_modes
+from reflowshock.workflow.verdict.answer import criteria_table, failing
 
 FOLDERS = ("residual_two_scale", "residual_dns", "residual")  # one mode each, or common to all modes
 SIDES = ("von_mises_board", "von_mises_package")
@@ -60,7 +60,7 @@ def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dic
         energy=tables.energies(histories),
         cost=tables.costs(results),
         published_cost=cost.table(results, metrics),
-        limits=limits_table(case.shock.failure),
+        criteria=criteria_table(summary["verdict"]),
     )
     context["published_source"] = cost.PAPER
     add_board(shock, case, histories, metrics, context)

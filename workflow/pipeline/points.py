@@ -1,6 +1,5 @@
 """Reading the points of a study, and the case of a run folder."""
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -9,10 +8,8 @@ from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.kinds import kind_named_in
 from reflowshock.workflow.pipeline.reader import SETTING, read_case
-from reflowshock.workflow.store.keys import digest_of
 from reflowshock.workflow.store.point import Point
-from reflowshock.workflow.store.product import SEAL
-from reflowshock.workflow.store.store import CASE
+from reflowshock.workflow.store.store import CASE, CASE_CHANGED, read_case_table
 
 
 class PointsError(CaseError):
@@ -85,14 +82,8 @@ def read_case_of_run(folder: Path) -> Case:
     Raises:
         CaseError: The folder is not a run folder, or its case is damaged.
     """
-    path = folder / CASE
+    table = read_case_table(folder)
     try:
-        table = json.loads(path.read_text(encoding="utf-8"))
-        if table.pop(SEAL) != digest_of(table):
-            raise ValueError(SEAL)
         return kind_named_in(table).case.model_validate(table)
-    except FileNotFoundError as error:
-        raise CaseError(str(folder), [Problem("", "is not a run folder")]) from error
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
-        message = "was changed since it was written; `reflowshock run` with the case file writes it again"
-        raise CaseError(str(path), [Problem("", message)]) from error
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        raise CaseError(str(folder / CASE), [Problem("", CASE_CHANGED)]) from error

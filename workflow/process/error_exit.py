@@ -65,7 +65,7 @@ _run_folder: dict[str, Path] = {}  # "folder": run folder of this process, if it
 
 
 def set_run_folder(folder: Path) -> None:
-    """Set the run folder whose logs receive the details of an error."""
+    """Set the run folder of this process, into whose logs ``report_error`` writes tracebacks."""
     _run_folder["folder"] = folder
 
 
@@ -130,7 +130,7 @@ def _file_of(error: BaseException, where: Path | None) -> str:
 
 
 def handle_signals() -> None:
-    """Treat SIGTERM and SIGHUP like Ctrl-C unless they are ignored."""
+    """Make this process treat SIGTERM and SIGHUP like Ctrl-C (``KeyboardInterrupt``) unless they are ignored."""
     for name in END_SIGNALS:
         number = getattr(signal, name)
         if signal.getsignal(number) is not signal.SIG_IGN:

@@ -213,7 +213,12 @@ def error_of(lines: Sequence[str]) -> str:
 
 
 def without_traceback(text: str, log: Path) -> str:
-    """Replace the traceback in an error message by its last line and the path of the log."""
+    """Replace the traceback in an error message by its last line and the path of the log.
+
+    Args:
+        text: Error message; without a traceback it is returned unchanged.
+        log: Path to name.
+    """
     before, traceback, after = text.partition(TRACEBACK)
     if not traceback:
         return text

@@ -203,7 +203,12 @@ def text_table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]], r
 
 
 def new_table(title: str, *columns: str) -> Table:
-    """Return an empty table whose last column takes the remaining width."""
+    """Return an empty table for the terminal, whose last column takes the remaining width.
+
+    Args:
+        title: Title of the table.
+        columns: Column titles.
+    """
     table = Table(title=title, title_justify="left", title_style="bold", expand=True, show_edge=False, pad_edge=False)
     for position, name in enumerate(columns):
         last = position == len(columns) - 1

@@ -231,7 +231,11 @@ def _judge(coupling: Coupling, coupled: Coupled, steps: list[LoadStep], thermal:
 
 
 def final_exchanges(coupled: Coupled) -> list[Exchange]:
-    """Return the last exchange of each load step."""
+    """Return the last exchange (residuals of solder and structure) of each load step.
+
+    Args:
+        coupled: State of the coupling with all its exchanges.
+    """
     return list({exchange.load_step: exchange for exchange in coupled.exchanges}.values())
 
 

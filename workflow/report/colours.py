@@ -16,7 +16,12 @@ SCALES = {
 
 
 def colour_at(share: float, scale: Sequence[str] = tuple(SCALES["sequential"])) -> str:
-    """Return the colour at a position 0 to 1 of a scale, as ``#rrggbb``."""
+    """Return the interpolated colour at a position of a scale, as ``#rrggbb``.
+
+    Args:
+        share: Position, 0 to 1.
+        scale: Colours of the scale, from 0 to 1, evenly spaced.
+    """
     position = min(max(share, 0.0), 1.0) * (len(scale) - 1)
     index = min(int(position), len(scale) - 2)
     low, high = _channels(scale[index]), _channels(scale[index + 1])

@@ -19,7 +19,11 @@ STYLE = {
 
 
 def plain_ticks(axis) -> None:
-    """Label a logarithmic axis with plain numbers at 1, 2 and 5 of each decade."""
+    """Label a logarithmic axis with plain numbers at 1, 2 and 5 of each decade.
+
+    Args:
+        axis: Axis of Matplotlib, such as ``axes.xaxis``, changed in place.
+    """
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())

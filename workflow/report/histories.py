@@ -79,7 +79,7 @@ def late_peak(history: Arrays) -> str:
     """
     names = {PEEL: "peel", VON_MISES: "von Mises"}
     largest = {names[measure]: measure.worse(history).max(axis=1) for measure in settling_measures(history)}
-    late = [name for name, stress in largest.items() if np.argmax(stress) >= len(stress) - max(2, len(stress) // 50)]
+    late = [name for name, stress in largest.items() if peaks_late(stress)]
     if not late:
         return ""
     end = 1e3 * history["time"][-1]
@@ -87,3 +87,8 @@ def late_peak(history: Arrays) -> str:
         f"The {' and '.join(late)} stress is still rising when the simulated time ends ({end:.3g} ms): "
         "a longer shock.duration gives a higher peak."
     )
+
+
+def peaks_late(values: NDArray) -> bool:
+    """Return whether a history, shape (times,), is largest in the last fiftieth of the run."""
+    return bool(np.argmax(values) >= len(values) - max(2, len(values) // 50))

@@ -60,7 +60,7 @@ def product_key(case: Case, stage: Stage, inputs: dict, follows: Sequence[str | 
 
 
 def inputs_digest(case: Case) -> str:
-    """Return the SHA-256 of all parameters of a case that its stages depend on."""
+    """Return the SHA-256, hexadecimal, of all parameters and input files of a case that its stages depend on."""
     return digest_of({stage.name: stage_inputs(case, stage) for stage in case.pipeline.stages})
 
 

@@ -80,7 +80,11 @@ def _differs(records: Mapping[str, dict], name: str, point: Point) -> bool:
 
 
 def why_stale(state: StageState) -> str:
-    """Return in a few words why a stage has to run, except for changed parameters."""
+    """Return in a few words why a stage has to run.
+
+    Args:
+        state: State of its product; changed parameters are not listed.
+    """
     if state.damaged:
         return "its product is damaged: " + ", ".join(state.damaged)
     if state.because_of:

@@ -6,7 +6,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from reflowshock.problem import Problem
 from reflowshock.workflow.case.case import Case
+from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.stage import Stage
 from reflowshock.workflow.store.keys import digest_of
 from reflowshock.workflow.store.point import Point
@@ -15,6 +17,7 @@ from reflowshock.workflow.store.product import RECORD, SEAL, content_digest, dis
 HOME = ".store"  # in a run folder, or in the folder of a study
 REPETITIONS = 2  # of a cheap point, so that machine load and first compilation do not count
 CASE = "inputs/case.json"
+CASE_CHANGED = "was changed since it was written; `reflowshock run` with the case file writes it again"
 MESSAGE, TRACEBACK = "message.txt", "error.txt"  # in the partial folder of a failed stage
 
 
@@ -126,8 +129,26 @@ def reads(products: Mapping[str, Path], case: Case, stage: Stage) -> dict[str, s
     return digests
 
 
+def read_case_table(folder: Path) -> dict:
+    """Return the table of the case of a run folder.
+
+    Raises:
+        CaseError: the folder is not a run folder, or its case is damaged.
+    """
+    path = folder / CASE
+    try:
+        table: dict = json.loads(path.read_text(encoding="utf-8"))
+        if table.pop(SEAL) != digest_of(table):
+            raise ValueError(SEAL)
+    except (FileNotFoundError, NotADirectoryError) as error:
+        raise CaseError(str(folder), [Problem("", "is not a run folder")]) from error
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        raise CaseError(str(path), [Problem("", CASE_CHANGED)]) from error
+    return table
+
+
 def write_case(folder: Path, case: Case) -> None:
-    """Write the resolved case into a run folder unless the same file exists."""
+    """Write the resolved case as JSON, with its digest, into a run folder unless the same file exists."""
     path, content = folder / CASE, case.model_dump(mode="json")
     text = json.dumps(content | {SEAL: digest_of(content)}, indent=1) + "\n"
     if path.is_file() and path.read_bytes() == text.encode():

@@ -232,7 +232,12 @@ COMPARISONS: dict[str, Callable[[StructureCase, Any, Motion], tuple[dict, dict]]
 
 
 def bars_of(case: StructureCase, reference: BarWave) -> exact_bar.Bars:
-    """Return the two layers of a case as bars with their exact solution."""
+    """Return the two layers of a case as bars with their exact solution for a stress wave.
+
+    Args:
+        case: Case with two layers.
+        reference: Reference that names the load.
+    """
     from reflowshock.materials.elasticity import elasticity_matrix
 
     layers, materials = case.structure.layers.values(), case.problem.layer_materials.values()
@@ -272,7 +277,12 @@ def truncated_waves(case: StructureCase) -> Iterator[Problem]:
 
 
 def strip_of(case: StructureCase, reference: Cantilever) -> exact_cantilever.Strip:
-    """Return the only layer of a case as a strip with its exact solution."""
+    """Return the only layer of a case as a cantilever strip under pressure, with its exact solution.
+
+    Args:
+        case: Case with one layer.
+        reference: Reference that names the load.
+    """
     from reflowshock.materials.elasticity import elasticity_matrix
 
     (material,) = case.problem.layer_materials.values()
@@ -281,7 +291,7 @@ def strip_of(case: StructureCase, reference: Cantilever) -> exact_cantilever.Str
 
 
 def wave_points(reference: BarWave | LayeredBar) -> list[str]:
-    """Return the names of the watch points of a bar in the order of their heights."""
+    """Return the names of the three watch points of a bar, the lowest first: two incident ones, the transmitted one."""
     return [*reference.incident, reference.transmitted]
 
 

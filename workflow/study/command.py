@@ -65,7 +65,12 @@ def read_points_of(path: Path, oversubscribe: bool = False, force: bool = False)
 
 
 def show_forecast(points: Points, store: Store) -> None:
-    """Print the products to compute with their predicted cost."""
+    """Print the products of a study that are missing, by stage, with their predicted cost.
+
+    Args:
+        points: Points of the study, possible and impossible ones.
+        store: Store of the products, which is examined.
+    """
     possible = list(points.possible.values())
     stages = forecast_stages(possible, list_missing(store, possible, LAST))
     table = new_table(

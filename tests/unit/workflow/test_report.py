@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from reflowshock.fem.problem.failure import Failure
-from reflowshock.workflow.package.verdict import verdict_of
+from reflowshock.parameters import with_value
 from reflowshock.workflow.package_report import joint_tables
 from reflowshock.workflow.package_report.shock import ranking_mode
 from reflowshock.workflow.pipeline.reader import read_case
@@ -17,6 +17,8 @@ from reflowshock.workflow.report.curves import difference_curves, energy_curves,
 from reflowshock.workflow.report.histories import late_peak
 from reflowshock.workflow.solder import report as report_body
 from reflowshock.workflow.store.keys import inputs_digest
+from reflowshock.workflow.verdict.criterion import JudgedDrop
+from reflowshock.workflow.verdict.verdict import verdict_of
 from tests.support.products import record_of
 from tests.support.workflow_command import SMALL_CASE
 
@@ -50,7 +52,7 @@ def history():
 
 
 def test_joints_are_ranked_by_their_worse_pad(history):
-    judged = verdict_of(Failure(), history, "A10")["joints"]
+    judged = verdict_of(JudgedDrop(read_case(SMALL_CASE), {}, history))["joints"]
     table = joint_tables.ranked_joints(history, [{"name": name, **JOINT} for name in ("A9", "A10")], judged)
     assert [row[0] for row in table["rows"]] == ["A10", "A9"]
     assert table["rows"][0][1:3] == ["NO LIMIT", "–"]
@@ -72,7 +74,8 @@ def test_joints_tell_their_verdict_and_by_what(history):
     yielding = history | {"plastic_work_board": work, "plastic_work_package": 0.5 * work}
     joints = [{"name": name, **JOINT} for name in ("A9", "A10")]
     limits = {"peel_stress": {"limit": 8e6, "source": "us"}, "layer_plastic_work": {"limit": 3e5, "source": "us"}}
-    verdicts = verdict_of(Failure.model_validate(limits), yielding, "A10")["joints"]
+    case = with_value(read_case(SMALL_CASE), "shock.failure", Failure.model_validate(limits))
+    verdicts = verdict_of(JudgedDrop(case, {}, yielding))["joints"]
     table = joint_tables.ranked_joints(yielding, joints, verdicts)
     assert table["head"][5] == "plastic work, 25 µm layer [kJ/m³]"
     assert [row[0] for row in table["rows"]] == ["A10", "A9"]
