@@ -131,7 +131,7 @@ def _nearest_node(mesh: MeshData, name: str, position: NDArray[np.float64]) -> i
 
 
 def patch(mesh: MeshData, node: int) -> NDArray[np.int64]:
-    """Return the elements of one part around a node, followed by their neighbours in this part.
+    """Return the numbers of the elements of one part around a node, followed by their neighbours, shape (m,).
 
     If several parts meet at the node, the lowest one is used.
     """

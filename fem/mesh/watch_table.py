@@ -65,7 +65,7 @@ class WatchTable:
 
 
 def joint_names(mesh: MeshData) -> tuple[str, ...]:
-    """Return the names of the joints, in the order of the mesh."""
+    """Return the names of the joints, which follow ``solder@`` in part names, in the order of the mesh."""
     return tuple(name.split("@")[1] for name in mesh.part_names if name.startswith("solder@"))
 
 

@@ -12,7 +12,7 @@ COMPARED = {"die_displacement": "die_centre", "board_displacement": "board_centr
 
 
 def relative_error(values: NDArray[np.float64], reference: NDArray[np.float64]) -> float:
-    """Return the relative L2 error over time and components, |values - reference| / |reference|."""
+    """Return the relative L2 error over all entries, |values - reference| / |reference|, of arrays of equal shape."""
     scale = float(np.linalg.norm(reference))
     return float(np.linalg.norm(values - reference)) / scale if scale > 0.0 else float(np.linalg.norm(values))
 

@@ -21,7 +21,12 @@ from reflowshock.fem.parallel.rank_activity import ACTIVITY
 
 
 def picture_windows(times: Iterable[float], plan: WindowPlan) -> frozenset[int]:
-    """Return the windows whose ends are closest to some times [s]; times after the last window are skipped."""
+    """Return the numbers of the windows whose ends are closest to some times [s].
+
+    Args:
+        times: Times of pictures [s]; times after the last window are skipped.
+        plan: Size and number of the windows.
+    """
     windows = (round(time / plan.window) for time in times)
     return frozenset(window for window in windows if window <= plan.windows)
 

@@ -120,6 +120,10 @@ def _sum_by_slot(slot: NDArray[np.int64], values: NDArray[np.float64], count: in
 def section_values(sums: NDArray[np.float64], faces: PadFaces) -> dict[str, NDArray[np.float64]]:
     """Return the history values of a sample from the sums of ``JointSections`` over all ranks.
 
+    Args:
+        sums: Sums over all ranks of one sample, as returned by ``JointSections``.
+        faces: Pad faces of all joints.
+
     Returns:
         For the ends ``board`` and ``package``: ``section_<end>``, axial force, two shear forces [N], torsion and two
         bending moments about the pad centre [N m], shape (joints, 6); ``peel_<end>``, axial force over area, shape

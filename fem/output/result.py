@@ -140,7 +140,17 @@ def model_summary(comms: Communicators, steps: Steps, mode: str) -> dict[str, An
 
 
 def sizes(comms: Communicators, models: Mapping[Role, Model[Any]]) -> tuple[dict[Role, int], dict[Role, int]]:
-    """Return the numbers of elements and of nodes of every model; collective, complete on all ranks."""
+    """Return the numbers of elements and of nodes of every model.
+
+    Collective; each rank passes its own models, and every rank gets the numbers of all models.
+
+    Args:
+        comms: Communicators of the run and of its models.
+        models: Models of this rank.
+
+    Returns:
+        Elements by model, and nodes by model.
+    """
     counts = {role: (len(model.body.local.cells), model.tables.nodes) for role, model in models.items()}
     by_rank = comms.world.allgather(counts)
     elements = {role: sum(rank[role][0] for rank in by_rank if role in rank) for role in comms.first}

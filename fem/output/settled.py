@@ -31,12 +31,20 @@ def is_settled(history: Arrays) -> bool:
 
 
 def settling_measures(history: Arrays) -> tuple[Measure, ...]:
-    """Return the measures whose peaks must have passed."""
+    """Return the measures of the joints whose peaks must have passed before a run may end early.
+
+    ``history`` is as in ``is_settled``.
+    """
     return (PEEL,) if ranking_measure(history) is PLASTIC_WORK else (PEEL, VON_MISES)
 
 
 def half_oscillation(time: NDArray[np.float64], deflection: NDArray[np.float64]) -> float | None:
-    """Return the time of the first sign change of a deflection, shape (k,), None before it."""
+    """Return the time of the first sign change of a deflection [s], or None if its sign has not changed yet.
+
+    Args:
+        time: Sample times, shape (k,) [s].
+        deflection: Deflection of the board centre, shape (k,) [m].
+    """
     reached = np.maximum.accumulate(np.abs(deflection))
     crossings = (deflection[:-1] * deflection[1:] < 0.0) & (reached[:-1] >= SMALL * reached[-1])
     return float(time[1:][crossings][0]) if crossings.any() else None

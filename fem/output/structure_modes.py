@@ -72,7 +72,7 @@ def _at_rest_supports(model: StructureModel, request: StructureInput) -> Body:
 
 
 def write_modes(folder: Path, table: ModeTable) -> None:
-    """Write ``modes.json``."""
+    """Write the table of modes as ``modes.json`` into a folder."""
     (folder / "modes.json").write_text(json.dumps(_mode_rows(table), indent=1), encoding="utf-8")
 
 

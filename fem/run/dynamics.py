@@ -129,7 +129,7 @@ def place_models(world: MPI.Comm, divided: DividedModels[Any], request: RunInput
 
 
 def make_participants(comms: Communicators, problem: DynamicProblem, models: Models, steps: Steps) -> CoupledRun:
-    """Return the participants of this rank at time zero; collective."""
+    """Create the participants (models with loads, motion and coupling) of this rank at time zero; collective."""
     bodies = {role: model.body for role, model in models.items()}
     loads = {role: problem.loads(comms.models[role], model, steps) for role, model in models.items()}
     if problem.divided and problem.request.coupled:

@@ -26,7 +26,11 @@ RUNS: dict[type, Callable[[MPI.Comm, Any], None]] = {
 
 
 def main(world: MPI.Comm, arguments: list[str]) -> int:
-    """Run the input file named by the only argument on all ranks of ``world``, and return the exit code."""
+    """Run the JSON input file named by the only argument; collective over ``world``.
+
+    Returns:
+        Exit code, 0 for success and 1 for an error.
+    """
     try:
         request = agreed(world, lambda: _read_input(arguments))
     except AgreedError as error:

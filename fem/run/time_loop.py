@@ -117,7 +117,7 @@ def run_time_loop(
 
 
 def is_over(world: MPI.Comm, outputs: Outputs) -> bool:
-    """Return whether the run ends early; collective, decided on rank 0, which has the samples."""
+    """Return whether the run may end early; collective, decided on rank 0, which has the samples of the history."""
     if outputs.is_over is None:
         return False
     ACTIVITY.wait_for("the decision of rank 0 whether the run is over")
