@@ -90,7 +90,7 @@ def problems(reference: "Reference | None", kind: type[Case]) -> Iterator[Proble
 
 
 def _unusable(folder: Path, kind: type[Case]) -> str:
-    """Return why a folder is no usable reference for cases of a kind; empty if it is usable."""
+    """Return why a folder cannot be the reference for cases of a kind; empty if it is usable."""
     try:
         table = read_case_table(folder)
     except CaseError as error:

@@ -1,4 +1,4 @@
-"""Ratios of a drop's loads to those of a reference design, for the verdict and for comparisons of runs."""
+"""Ratios of a drop's loads to the loads of a reference design, for the verdict and for comparisons of runs."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,16 +15,16 @@ Metrics = Mapping[str, Mapping[str, Any]]
 
 @dataclass(frozen=True, slots=True)
 class Ratio:
-    """Ratio of a metric to that of a reference; None with the reason why it is undefined."""
+    """Ratio of a metric to its value in a reference design; None with the reason why it is undefined."""
 
     value: float | None
     why: str = ""
 
 
 def ratio_of(name: str, metrics: Metrics, reference: Metrics) -> Ratio:
-    """Return the ratio of a metric of ``RATIOS`` to that of a reference.
+    """Return the ratio of a metric of ``RATIOS`` to its value in a reference design.
 
-    Joint metrics are those of the critical joint of each design.
+    Joint metrics belong to the critical joint of each design.
     """
     for owner, values in (("this run", metrics), ("the reference", reference)):
         if name not in values:
@@ -42,7 +42,7 @@ def ratio_of(name: str, metrics: Metrics, reference: Metrics) -> Ratio:
 
 @dataclass(frozen=True)
 class ReferenceRatio(Criterion):
-    """Ratio of a load to that of a design that is known to survive.
+    """Ratio of a load to its value in a design that is known to survive.
 
     Attributes:
         metric: Name of the metric.
