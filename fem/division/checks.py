@@ -112,6 +112,12 @@ def steps_of(
 ) -> Iterator[tuple[str, float, NDArray[np.bool_], NDArray[np.float64]]]:
     """Yield all time steps of a division, each with the cells that limit it.
 
+    Args:
+        whole: Joined mesh of both models with its ties.
+        survey: Critical steps of its cells [s].
+        division: Cells of each model, step levels and window (coupling interval).
+        rules: Settings from which the division was made, with the ratio of step to critical step.
+
     Yields:
         Name of the step for messages, its size [s], mask of the cells that take it, shape (ne,), and the largest stable
         step of every cell, shape (ne,) [s], of which only the masked ones count.
@@ -133,7 +139,7 @@ def steps_of(
 
 
 def check_pulses(durations: Iterable[float], window: float, fraction: float) -> None:
-    """Check that no pulse is shorter than a coupling window.
+    """Check that no pulse is shorter than a window, the time between two exchanges of macro and meso model.
 
     Args:
         durations: Durations of the pulses [s].

@@ -126,7 +126,9 @@ def least_steps(ratios: tuple[int, ...], limits: StepLimits) -> NDArray[np.float
 
 @cache
 def reach_of(ratio: int, level: int, damping: float) -> float:
-    """Return the largest stable step of a level's substeps relative to plain leapfrog, see ``Substeps``.
+    """Return the largest stable step of a level's substeps relative to plain leapfrog, dimensionless.
+
+    A level takes ``ratio`` substeps in a step of the surrounding level, see ``Substeps``.
 
     Args:
         ratio: Substeps in one step of the surrounding level.

@@ -79,17 +79,32 @@ def decide_scheme(rules: Rules, steps: NDArray[np.float64], linear: bool, has_bu
 def plan_windows(rules: Rules, slow: NDArray[np.bool_], steps: NDArray[np.float64]) -> WindowPlan:
     """Return windows and substeps of two models that take one step each.
 
+    A window is the time between two exchanges of the models and the step of the macro model.
+
     Args:
-        rules: Rules of the division.
-        slow: Cells that take the window, shape (ne,); all cells where there are none.
+        rules: Rules of the division, with duration, samples and step over critical step.
+        slow: Cells that take the window as their step, shape (ne,); if none does, all cells limit the window.
         steps: Critical steps of all cells, shape (ne,) [s].
+
+    Returns:
+        Window [s], meso steps per window, number of windows, and windows per history sample.
     """
     damped = damped_critical_step(steps, rules.stiffness)
     return rules.plan(float(damped[slow if slow.any() else ...].min()), float(damped.min()))
 
 
 def in_two_steps(scheme: SchemeName, macro: NDArray[np.bool_], meso: NDArray[np.bool_], plan: WindowPlan) -> Division:
-    """Return the division of a scheme whose models, masks of shape (ne,), take one step each."""
+    """Return the division of a scheme whose models take one step each.
+
+    Args:
+        scheme: Name of the coupling scheme.
+        macro: Cells of the macro model, shape (ne,).
+        meso: Cells of the meso model, shape (ne,).
+        plan: Windows (coupling intervals, the steps of the macro model) and substeps (meso steps in a window).
+
+    Returns:
+        Division in which all cells have step level 0.
+    """
     return Division(scheme, macro, meso, meso.astype(np.int32), (plan.substeps,), plan)
 
 
@@ -113,13 +128,16 @@ def in_local_steps(
 
 
 def in_path_levels(division: Division, rules: Rules, limits: StepLimits, around: Around) -> Division:
-    """Return a division of held velocity with step levels in its meso model; other arguments as ``with_path_levels``.
+    """Return a division of held velocity with the step levels of least predicted cost in its meso model.
+
+    The number of levels is at most ``rules.coupling.most_levels``.
 
     Args:
         division: Division with a single level in the meso model.
         rules: Settings; their coupling limits the number of levels.
-        limits: Critical steps and costs of all cells.
-        around: Function that returns the meso cells sharing a node with given cells, shape (ne,).
+        limits: Critical steps [s] and costs of all cells.
+        around: Function that takes a mask of cells and returns the mask of the meso cells that share a node with them,
+            also through ties, shape (ne,) each.
     """
     return with_path_levels(division, limits, around, rules.coupling.most_levels)
 
@@ -162,11 +180,26 @@ def _slow_rows(rules: Rules) -> NDArray[np.bool_]:
 
 
 def plan_estimate(estimate: MeshEstimate, rules: Rules) -> WindowPlan:
-    """Return windows and substeps of an estimated mesh; the substeps are the steps of a DNS in a window."""
+    """Return windows and substeps of an estimated mesh.
+
+    Args:
+        estimate: Parts of the mesh with their critical steps.
+        rules: Rules of the division, whose masks have shape (n,), one entry for each row of the estimate.
+
+    Returns:
+        Windows of the two-scale run; the substeps are the steps in a window of a DNS (one model without scales).
+    """
     return plan_windows(rules, _slow_rows(rules), estimate.steps)
 
 
 def longest_window(estimate: MeshEstimate, rules: Rules) -> float:
-    """Return the longest window [s] that the elements of an estimated mesh allow, for runs of any duration."""
+    """Return the longest window [s] that the elements of an estimated mesh allow, for runs of any duration.
+
+    A window is the time between two exchanges of macro and meso model.
+
+    Args:
+        estimate: Parts of the mesh with their critical steps.
+        rules: Rules of the division; duration and samples are not used.
+    """
     slow = damped_critical_step(estimate.steps[_slow_rows(rules)], rules.stiffness)
     return rules.fraction * float(slow.min())

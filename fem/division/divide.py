@@ -30,11 +30,15 @@ def divide(whole: Whole, survey: Survey, rules: Rules) -> Division:
     The result is not checked yet; ``checks.check_division`` does that.
 
     Args:
-        whole: Joined mesh with its ties.
+        whole: Joined mesh of both models with its ties.
         survey: Critical steps, costs and linearity of its cells.
         rules: Settings of the division.
 
+    Returns:
+        Division: scheme with its reason, masks of the cells of each model, level of each cell, windows and substeps.
+
     Raises:
+        CouplingError: Local steps are set, and supports have springs.
         LevelError: The critical steps differ by more than the levels allow.
     """
     choice = scheme_for(whole, survey, rules)
@@ -50,12 +54,15 @@ def divide(whole: Whole, survey: Survey, rules: Rules) -> Division:
 
 
 def scheme_for(whole: Whole, survey: Survey, rules: Rules) -> Choice:
-    """Return the coupling scheme for a joined mesh, with the reason; raises as ``decide_scheme``.
+    """Return the coupling scheme for a joined mesh, with the reason as text.
 
     Args:
-        whole: Joined mesh with its ties.
+        whole: Joined mesh of both models with its ties.
         survey: Critical steps and linearity of its cells.
         rules: Settings; ``coupling.scheme`` other than "auto" is returned unchanged.
+
+    Raises:
+        CouplingError: Local steps are set, and supports have springs.
     """
     return decide_scheme(
         rules,
@@ -99,7 +106,17 @@ def _divide_for_impulse(whole: Whole, survey: Survey, rules: Rules) -> Division:
 
 
 def held_velocity_division(whole: Whole, survey: Survey, rules: Rules, meso: NDArray[np.bool_]) -> Division:
-    """Return the division of held velocity for the cells of the meso model, shape (ne,)."""
+    """Return the division for the scheme of held velocity with given cells of the meso model.
+
+    Args:
+        whole: Joined mesh of both models with its ties.
+        survey: Critical steps of its cells.
+        rules: Settings of the division.
+        meso: Cells of the meso model, shape (ne,); all others form the macro model.
+
+    Returns:
+        Division with one step in each model; the window is limited by the macro cells and the cells at the interface.
+    """
     slow = ~meso | touching(whole.mesh.cells, cut_nodes(whole.mesh.cells, meso, len(whole.mesh.points)))
     return in_two_steps("held_velocity", ~meso, meso, plan_windows(rules, slow, survey.step))
 
@@ -122,7 +139,13 @@ def _divide_for_one_way(
 
 
 def cut_nodes(cells: NDArray[np.int32], meso: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:
-    """Return which of ``count`` nodes belong to cells of both models, shape (count,)."""
+    """Return which nodes belong to cells of both models, shape (count,).
+
+    Args:
+        cells: Nodes of each cell, shape (ne, k).
+        meso: Cells of the meso model, shape (ne,); all others are macro.
+        count: Number of nodes.
+    """
     return nodes_of(cells, meso, count) & nodes_of(cells, ~meso, count)
 
 

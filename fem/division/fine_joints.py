@@ -19,10 +19,15 @@ KEY = "shock.coupling.fine_joints"
 
 
 def read_package(request: PackageInput) -> MeshData:
-    """Read the meshes of a run, with fine or coarse joints as requested.
+    """Read the meshes of a run as one mesh, with fine or coarse joints as ``shock.coupling.fine_joints`` requests.
+
+    One-way coupling also appends coarse copies of the fine joints, for the model that drives the fine one.
+
+    Args:
+        request: Input with the paths of the meshes and the coupling settings.
 
     Raises:
-        MeshError: A joint is unknown, or no file has the coarse joints.
+        MeshError: A joint is unknown, no file has the coarse joints, or a file cannot be used (``read_mesh``).
     """
     fine = request.shock.coupling.fine_joints
     mesh = read_meshes(request.meshes)
@@ -38,6 +43,9 @@ def read_package(request: PackageInput) -> MeshData:
 
 def read_coarse(path: Path | None) -> MeshData:
     """Read the mesh of coarse joints.
+
+    Args:
+        path: Gmsh file of the coarse joints, None if the input names none.
 
     Raises:
         MeshError: The path is None, or the file cannot be read.
@@ -76,7 +84,13 @@ def with_coarse_joints(mesh: MeshData, coarse: MeshData, fine: Collection[str]) 
 
 
 def copies(coarse: MeshData, fine: Collection[str]) -> MeshData:
-    """Return coarse copies of fine joints for the driving model of one-way coupling, renamed and not watched.
+    """Return coarse copies of fine joints for the driving model of one-way coupling.
+
+    The copies lose their pad facets, so that they are not watched; ``COPY`` replaces ``@`` in their part names.
+
+    Args:
+        coarse: Mesh with coarse joints.
+        fine: Names of the fine joints to be copied.
 
     Raises:
         MeshError: A fine joint has no coarse mesh.

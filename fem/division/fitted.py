@@ -51,14 +51,17 @@ class FittedTable:
 
 
 def fitted(mesh: MeshData, fittings: Fittings, symmetry: Sequence[str], slaves: NDArray, yields: bool) -> FittedTable:
-    """Return the tables of the fittings of a mesh.
+    """Return the tables of the fittings (supports, lumped masses, watch points, gauges) of a mesh.
 
     Args:
         mesh: Mesh of the whole body.
         fittings: Fittings of the input.
-        symmetry: Axes that are normal to a symmetry plane through the origin.
-        slaves: Slave nodes, which follow their masters.
+        symmetry: Axes ``x``, ``y``, ``z`` that are normal to a symmetry plane through the origin; may be empty.
+        slaves: Slave nodes, which follow their masters and are not held, shape (ns,).
         yields: Whether plastic strain is watched.
+
+    Returns:
+        Nodes and cells of the fittings in the numbers of this mesh.
 
     Raises:
         MeshError: A watch point is outside the mesh.
@@ -77,7 +80,21 @@ def fitted(mesh: MeshData, fittings: Fittings, symmetry: Sequence[str], slaves: 
 
 
 def fit_to_mesh(mesh: MeshData, chosen: NDArray[np.bool_], fittings: Fittings, yields: bool) -> FittedTable:
-    """Return the fittings of selected cells of a mesh, shape (ne,), such as the board; raises as ``fitted``."""
+    """Return the fittings (supports, masses, watch points, gauges) of selected cells, such as the board.
+
+    Args:
+        mesh: Whole mesh.
+        chosen: Cells that carry the fittings, shape (ne,).
+        fittings: Fittings of the input.
+        yields: Whether plastic strain is watched.
+
+    Returns:
+        Tables in the node and cell numbers of the whole mesh.
+
+    Raises:
+        MeshError: No cell is selected, or a watch point is outside the selected cells.
+        LoadError: A facet set is empty, or a mass or the end of a gauge is outside the selected cells.
+    """
     body, number = selected_cells(mesh, chosen)
     symmetry = [axis for axis in AXES if len(body.facets_of(f"symmetry_{axis}"))]
     nodes, cells = np.flatnonzero(number >= 0).astype(np.int32), np.flatnonzero(chosen)

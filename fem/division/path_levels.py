@@ -31,8 +31,9 @@ def with_path_levels(division: Division, limits: StepLimits, around: Around, mos
 
     Args:
         division: Division with a single level.
-        limits: Critical steps and costs of all cells.
-        around: Function that returns the meso cells sharing a node with given cells, also through ties, shape (ne,).
+        limits: Critical steps [s] and costs of all cells.
+        around: Function that takes a mask of cells and returns the mask of the meso cells that share a node with them,
+            also through ties, shape (ne,) each.
         most: Largest number of levels.
     """
     plan, finer = division.plan, FinerCells(division.meso, limits, around)

@@ -17,9 +17,10 @@ def coupling_record(division: Division, survey: Survey, cut_nodes: int) -> dict[
         cut_nodes: Number of interface nodes.
 
     Returns:
-        ``scheme``, ``why`` (reason as text), ``m`` (meso steps per window), ``ratios``, ``meso_share`` (share of the
-        cells in the meso model), ``cut_nodes``, and ``levels``: a list from the window inwards of dictionaries with
-        ``step`` [s], ``elements`` (count) and ``cost_share`` (share of the total cost per second).
+        ``scheme``, ``why`` (reason as text), ``m`` (meso steps per window, the time between two exchanges), ``ratios``
+        (steps of level k + 1 in one step of level k), ``meso_share`` (share of the cells in the meso model),
+        ``cut_nodes``, and ``levels``: a list from the window inwards of dictionaries with ``step`` [s], ``elements``
+        (count) and ``cost_share`` (share of the total cost per second).
     """
     plan = division.plan
     level, steps = division.level, (plan.window / division.counts).tolist()

@@ -30,7 +30,14 @@ class Part:
 
 
 def part_of(whole: Whole, cells: NDArray[np.bool_]) -> Part:
-    """Return the part of a mesh with the selected cells, shape (ne,).
+    """Return the part of a joined mesh with the selected cells, the slaves among its nodes, and all their masters.
+
+    Args:
+        whole: Joined mesh with its ties.
+        cells: Selected cells, shape (ne,).
+
+    Returns:
+        Mesh and tie in the numbers of the part, and the maps from old to new node and cell numbers (-1 if absent).
 
     Raises:
         MeshError: No cell is selected.

@@ -63,6 +63,13 @@ class StructureTables(Tables):
 def tie_layers(mesh: MeshData, problem: StructureProblem) -> Whole:
     """Tie layers of a structure with different meshes.
 
+    Args:
+        mesh: Mesh of the structure with facet sets ``slave@...`` and ``master@...`` where meshes do not match.
+        problem: Parameters of the structure, with its layers and cell shape.
+
+    Returns:
+        Mesh with slave nodes moved onto the master facets, their ties, and the largest such move [m].
+
     Raises:
         MeshError: The cell shape, or the set of layers, differs between mesh and input.
         TieError: Layers with different meshes do not touch.
@@ -72,10 +79,19 @@ def tie_layers(mesh: MeshData, problem: StructureProblem) -> Whole:
 
 
 def structure_tables(whole: Whole, problem: StructureProblem) -> StructureTables:
-    """Build the tables of a structure.
+    """Build the tables of a structure: ties, fixed components, nodes and areas of loads, fittings.
+
+    Args:
+        whole: Mesh of the structure with its ties.
+        problem: Parameters of the structure, with loads and supports.
+
+    Returns:
+        Tables in the node and cell numbers of the undivided mesh.
 
     Raises:
-        MeshError, LoadError: As ``fitted``; a force is outside the mesh, or a motion acts on a fixed component.
+        MeshError: A watch point is outside the mesh.
+        LoadError: A facet set is missing or empty; a force, a mass or the end of a gauge is outside the mesh; or a
+            motion acts on a fixed component.
     """
     mesh, tie = whole.mesh, whole.tie
     moved = [load.on for load in problem.loads.values() if isinstance(load, OnNodes)]
@@ -155,7 +171,10 @@ def _check_shaken(problem: StructureProblem, nodes_of: dict[str, NDArray[np.inte
 
 
 def shaken_supports(problem: StructureProblem) -> list[str]:
-    """Return the supports that a large mass moves: fully fixed ones, if an input-G uses a large mass."""
+    """Return the names of the supports that a large mass moves: those that fix x, y and z.
+
+    Empty if no load of the structure is an input acceleration by a large mass.
+    """
     by_mass = any(load.is_large_mass for load in problem.loads.values())
     return [name for name, support in problem.supports.items() if by_mass and set(support.hold) == set(AXES)]
 

@@ -154,10 +154,18 @@ class ModelInput(Generic[TablesT_co]):
 
 
 def join_meshes(data: MeshData) -> Whole:
-    """Merge the nodes of board and board patch, insert columns, and tie the joints.
+    """Merge the nodes of board and board patch, insert the columns of fine joints, and tie the joints.
+
+    Args:
+        data: Mesh of board, board patch, package and joints without common nodes.
+
+    Returns:
+        Mesh with the ties of its slaves, which were moved onto their facets, and the largest such move [m].
 
     Raises:
-        CouplingError, MeshError, TieError: The parts of the mesh do not fit together.
+        CouplingError: A node of the patch has no partner in the board.
+        MeshError: A column does not fit into the boxes that it replaces.
+        TieError: The end of a joint does not lie on board or package.
     """
     macro_nodes, meso_nodes = find_interface(data)
     return Whole(*tie_joints(insert_columns(merge_nodes(data, meso_nodes, macro_nodes)[0])))
@@ -166,7 +174,19 @@ def join_meshes(data: MeshData) -> Whole:
 def prepare(
     data: MeshData, division: Division | Literal["dns"], rules: Mapping[str, Sequence[int]] = HELD
 ) -> dict[Role, ModelInput[JointTables]]:
-    """Join the meshes of a package on a board and split them into models; arguments and models as ``model_inputs``."""
+    """Join the meshes of a package on a board and split them into models, without fittings.
+
+    Args:
+        data: Mesh of board, board patch, package and joints without common nodes.
+        division: Cells of each model, or "dns" for one model without scales.
+        rules: Facet set -> its fixed components (0, 1, 2 for x, y, z).
+
+    Returns:
+        Mesh and tables of the models ``macro`` and ``meso``, or of the single model ``dns``.
+
+    Raises:
+        CouplingError, MeshError, TieError: The parts of the mesh do not fit together, or a pad has no solder.
+    """
     return model_inputs(join_meshes(data), division, rules)
 
 
@@ -177,10 +197,17 @@ def model_inputs(
     layer: float = JOINT_LAYER,
     fittings: FittedTable | None = None,
 ) -> dict[Role, ModelInput[JointTables]]:
-    """Split a package on a board into its models; arguments as in ``JointTables.of``.
+    """Split a package on a board into its models.
+
+    Args:
+        whole: Joined mesh with its ties.
+        division: Cells of each model, or "dns" for one model without scales.
+        rules: Facet set -> its fixed components (0, 1, 2 for x, y, z).
+        layer: Thickness of the solder layer at the pads over which stress is averaged [m].
+        fittings: Supports, masses, watch points and gauges of the board; None without them.
 
     Returns:
-        Models ``macro`` and ``meso``, or the single model ``dns``.
+        Mesh and tables of the models ``macro`` and ``meso``, or of the single model ``dns``.
 
     Raises:
         MeshError: A pad has no solder, or the layer is thicker than a joint.
@@ -201,6 +228,9 @@ def split(whole: Whole, tables: TablesT, division: Division) -> dict[Role, Model
         whole: Joined mesh with its ties.
         tables: Loads, supports and watch points in the numbers of this mesh.
         division: Cells of each model.
+
+    Returns:
+        For each model its mesh, its tables in its own node and cell numbers, and the numbers of its cells in ``whole``.
     """
     macro, meso = part_of(whole, division.macro), part_of(whole, division.meso)
     interface = interface_between(whole, part_of(whole, division.around), meso)
@@ -246,5 +276,9 @@ def _part_input(
 
 
 def present(numbers: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the numbers of nodes or cells that belong to this model, which are the non-negative ones."""
+    """Return the non-negative ones of some node or cell numbers, shape (m,), in the same order.
+
+    Args:
+        numbers: Numbers in this model, -1 for nodes or cells of other models, shape (k,).
+    """
     return numbers[numbers >= 0]

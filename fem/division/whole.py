@@ -88,8 +88,11 @@ def survey(mesh: MeshData, materials: Materials | Mapping[str, Material], treatm
 
     Args:
         mesh: Mesh with named parts.
-        materials: Material of each role.
-        treatment: Formulation, kinematics and mass scaling.
+        materials: One material for each role, or the material of each part by name.
+        treatment: Formulation, kinematics and mass scaling of the elements.
+
+    Returns:
+        Arrays of shape (ne,): role, critical step [s], mass [kg], factor of mass scaling, linearity, relative cost.
 
     Raises:
         MeshError: An element is inverted.
@@ -165,14 +168,25 @@ def touching(cells: NDArray[np.int32], nodes: NDArray[np.bool_]) -> NDArray[np.b
 
 
 def nodes_of(cells: NDArray[np.int32], chosen: NDArray[np.bool_], count: int) -> NDArray[np.bool_]:
-    """Return which of ``count`` nodes belong to one of the chosen cells, shape (ne,)."""
+    """Return which nodes belong to one of the chosen cells, shape (count,).
+
+    Args:
+        cells: Nodes of each cell, shape (ne, k).
+        chosen: Chosen cells, shape (ne,).
+        count: Number of nodes.
+    """
     is_used = np.zeros(count, dtype=bool)
     is_used[cells[chosen]] = True
     return is_used
 
 
 def seeds_of(whole: Whole, fine: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the nodes of fine cells, shape (ne,), and the masters they are tied to, shape (n,)."""
+    """Return which nodes belong to fine cells or are masters of such a node, shape (n,).
+
+    Args:
+        whole: Joined mesh with its ties, n nodes.
+        fine: Fine cells, shape (ne,).
+    """
     nodes = nodes_of(whole.mesh.cells, fine, len(whole.mesh.points))
     nodes[whole.tie.master[nodes[whole.tie.slave]]] = True
     return nodes

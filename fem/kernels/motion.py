@@ -17,7 +17,7 @@ def advance(state, mobility, acceleration, step):
             updated.
         mobility: Inverse mass 1 / m, zero where the velocity is prescribed, shape (n, 3) [1/kg].
         acceleration: Acceleration g of the body force, shape (3,) [m/s^2].
-        step: Time step dt [s].
+        step: Time step dt, scalar [s].
     """
     kicks = np.zeros((3, 3))
     for c in range(3):
@@ -37,10 +37,10 @@ def move(state, mobility, nodes, kicks, steps):
         state: Displacement [m], velocity half a step back [m/s] and force [N], shape (3, n, 3); the first two are
             updated.
         mobility: Inverse mass, zero where the velocity is prescribed, shape (n, 3) [1/kg].
-        nodes: First node and end of the range.
+        nodes: First node of the range and the node after its last, two integers.
         kicks: Contributions of the body force: velocity in the first step, velocity in the others [m/s], and
-            displacement by the latter [m], shape (3, 3), see ``kicks_of``.
-        steps: Time step dt [s] and number of steps.
+            displacement by the latter [m], one row each with components x, y, z, shape (3, 3).
+        steps: Time step dt, scalar [s], and number of steps, integer.
     """
     step, span = steps[0], steps[0] * steps[1]
     strips = np.empty((3, STRIP))
@@ -65,9 +65,9 @@ def kicks_of(accelerations, step, kicks):
 
     Args:
         accelerations: Body acceleration as each step begins, shape (k, 3) [m/s^2].
-        step: Time step dt [s].
-        kicks: Written: velocity in the first step, velocity in the others [m/s], and displacement by the latter [m];
-            shape (3, 3).
+        step: Time step dt, scalar [s].
+        kicks: Written: velocity in the first step, velocity in the others [m/s], and displacement by the latter [m],
+            one row each with components x, y, z, shape (3, 3).
     """
     for c in range(3):
         gained = drift = 0.0
@@ -98,11 +98,11 @@ def work_of_changes(nodes, changes, accelerations, step):
     """Return the work [J] of the varying part of a body force in steps that ``move`` has taken at once.
 
     Args:
-        nodes: Nodal masses in the energy balance (n,) [kg], velocities after the steps (n, 3) [m/s], mobility (n, 3) as
-            in ``move``.
+        nodes: Nodal masses in the energy balance (n,) [kg], velocities after the steps (n, 3) [m/s], inverse masses,
+            zero where the velocity is prescribed, (n, 3) [1/kg].
         changes: Mean of the varying part in each step, shape (k, 3) [m/s^2].
         accelerations: Whole body acceleration as each step begins, shape (k, 3) [m/s^2].
-        step: Time step dt [s].
+        step: Time step dt, scalar [s].
     """
     if not np.any(changes):
         return 0.0
@@ -129,7 +129,7 @@ def spread_to_slaves(slave, master, weight, values):
         slave: Slave nodes, shape (ns,).
         master: Four masters of each slave, shape (ns, 4).
         weight: Weights of the masters, shape (ns, 4).
-        values: Nodal vectors, such as displacements or velocities, shape (n, 3).
+        values: Nodal vectors, such as displacements or velocities, shape (n, 3); the rows of slaves are overwritten.
     """
     for i in range(len(slave)):
         x = y = z = 0.0
@@ -147,10 +147,10 @@ def gather_from_slaves(slave, master, weight, values):
     """Add the rows of slave nodes to the rows of their masters by the weights, then zero the slaves' rows.
 
     Args:
-        slave: As in ``spread_to_slaves``.
-        master: As in ``spread_to_slaves``.
-        weight: As in ``spread_to_slaves``.
-        values: Nodal vectors, such as forces, shape (n, 3).
+        slave: Slave nodes, shape (ns,).
+        master: Four masters of each slave, shape (ns, 4).
+        weight: Weights of the masters, shape (ns, 4).
+        values: Nodal vectors, such as forces, shape (n, 3); rows of slaves and masters change.
     """
     for i in range(len(slave)):
         row = np.uintp(slave[i])
@@ -211,8 +211,8 @@ def add_impulse(rows, force, scale, impulse):
     Args:
         rows: Nodes, shape (k,); nodes with numbers of at least ``len(force)`` are skipped.
         force: Force of the leading nodes, shape (n, 3) [N].
-        scale: Weight of the force, [s] for an impulse, [s^2] for its first moment in time.
-        impulse: Impulse of each node in ``rows``, shape (k, 3), added to.
+        scale: Weight of the force, a scalar: [s] for an impulse, [s^2] for its first moment in time.
+        impulse: Impulse [N s], or first moment [N s^2], of each node in ``rows``, shape (k, 3), added to.
     """
     for i in range(len(rows)):
         if rows[i] < len(force):
@@ -225,8 +225,9 @@ def add_ahead(ahead, force):
     """Add ``ahead``, the force stored for the following steps, to the force, and zero it.
 
     Args:
-        ahead: Shape (n, 3), or (0, 3) if no force acts at intervals [N].
-        force: Nodal force, shape (n, 3) [N], added to.
+        ahead: Stored force, shape (n, 3) [N], zeroed; or (0, 3) if no force acts at intervals, which leaves all as it
+            is.
+        force: Nodal force of this step, shape (n, 3) [N], added to.
     """
     total, rest = force.reshape(-1), ahead.reshape(-1)  # flat: loops that fill vectors
     for i in range(len(rest)):
@@ -240,7 +241,7 @@ def add_pushed(pushed, every, force, ahead):
 
     Args:
         pushed: Force for one step, shape (n, 3) [N], zeroed.
-        every: Number of steps for which it acts.
+        every: Number of steps for which it acts, integer.
         force: Force of this step, shape (>= n, 3) [N]; receives one share, or all ``every`` shares if ``ahead`` is
             empty.
         ahead: Force for the following steps, shape (>= n, 3) [N], receives ``every - 1`` shares; or empty, shape (0,
@@ -274,10 +275,10 @@ def link_velocities(rows, velocity, force, terms, link):
         rows: Nodes of the interface, shape (k,).
         velocity: Velocity half a step back, shape (n, 3) [m/s].
         force: Nodal force, shape (n, 3) [N], added to.
-        terms: Half time step over mass, dt/2 / m [s/kg]; relative velocity of both models under a unit link [s/kg],
-            infinite without a link;
-            target velocity [m/s]; weight of the work of the link [s]; shape (4, k, 3).
-        link: Link forces of the previous step on entry, of this step on return, shape (n, 3) [N].
+        terms: Rows: half time step over mass, dt/2 / m [s/kg]; relative velocity of both models under a unit link
+            [s/kg], infinite where no link acts; target velocity [m/s]; weight of the work of the link [s]. Shape (4, k,
+            3).
+        link: Link forces at all nodes, of the previous step on entry, of this step on return, shape (n, 3) [N].
 
     Returns:
         Work of the link over the step, by the mean of both ends, scalar [J].
@@ -305,7 +306,7 @@ def add_damping(velocity, mobility, acceleration, coefficients, forces):
         velocity: Velocity v half a step back, shape (n, 3) [m/s].
         mobility: Inverse mass, zero where the velocity is prescribed and no drag acts, shape (n, 3) [1/kg].
         acceleration: Acceleration g of the body force, shape (3,) [m/s^2].
-        coefficients: Damping coefficient c [1/s] and half time step dt/2 [s].
+        coefficients: Damping coefficient c [1/s] and half time step dt/2 [s], a tuple of two scalars.
         forces: Damping (stiffness-proportional on entry, total on return) and nodal force f (without damping on entry,
             with it on return), two arrays of shape (n, 3) [N].
     """

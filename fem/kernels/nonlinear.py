@@ -54,9 +54,9 @@ def small_increment(w, state):
     """Write the small-strain increments of sixteen elements at one point, and store the new strains.
 
     Args:
-        w: Flat workspace; reads the displacement gradient at ``DEFORMATION``, writes the increment (xx, yy, zz, xy, yz,
-            xz, engineering shear) at ``INCREMENT``.
-        state: Flat state of the point, shape (208,); the strain at ``STRETCH`` is replaced.
+        w: Flat workspace, entry k of element e at ``16 * k + e``; reads the displacement gradient (nine entries, row by
+            row) at ``DEFORMATION``, writes the increment (xx, yy, zz, xy, yz, xz, engineering shear) at ``INCREMENT``.
+        state: Flat state of the point in the same order, shape (208,); the six strains at ``STRETCH`` are replaced.
     """
     for lane in range(LANES):
         h = nine(w, DEFORMATION + lane)
@@ -79,7 +79,11 @@ def small_increment(w, state):
 
 @njit(**LANE_OPTIONS)
 def add_identity(w):
-    """Add 1 to the displacement gradients of sixteen elements at ``DEFORMATION`` of a flat workspace, giving F."""
+    """Add 1 to the displacement gradients of sixteen elements, which gives the deformation gradients F.
+
+    Args:
+        w: Flat workspace; the 3 x 3 matrices at ``DEFORMATION`` change, entry k of element e at ``16 * k + e``.
+    """
     for lane in range(LANES):
         w[DEFORMATION + lane] += 1.0
         w[DEFORMATION + 4 * LANES + lane] += 1.0
@@ -91,7 +95,8 @@ def start_rotation(w):
     """Copy F of sixteen elements as the start value of the iteration for the rotation R.
 
     Args:
-        w: Flat workspace; F is read at ``DEFORMATION`` and copied to ``ROTATION``.
+        w: Flat workspace, entry k of element e at ``16 * k + e``; F (nine entries) is copied from ``DEFORMATION`` to
+            ``ROTATION``.
 
     Returns:
         Number of elements that are turned inside out (det F <= 0), as a float.
@@ -109,7 +114,8 @@ def improve_rotation(w):
     """Take one Newton step X -> (X + X^-T) / 2 towards the rotation of each of sixteen elements (Higham 1986).
 
     Args:
-        w: Flat workspace; X at ``ROTATION``, a 3 x 3 matrix per element, is improved.
+        w: Flat workspace; the 3 x 3 matrix X of each element at ``ROTATION``, its entry k (row by row) of element e at
+            ``16 * k + e``, is improved.
 
     Returns:
         Sum of the squared changes of all entries of all elements, a scalar.
@@ -131,8 +137,8 @@ def rotate(w):
     """Write the rotations R of the polar decomposition F = R U of sixteen elements.
 
     Args:
-        w: Flat workspace; reads F at ``DEFORMATION`` and writes R at ``ROTATION``, nine entries of sixteen elements
-            each.
+        w: Flat workspace; reads F at ``DEFORMATION`` and writes R at ``ROTATION``, entry k (row by row) of element e at
+            ``16 * k + e``.
 
     Returns:
         Whether no element is turned inside out (det F > 0); otherwise R is not valid.
@@ -150,9 +156,10 @@ def stretch_increment(w, state):
     """Write the finite strain increments of sixteen elements at one point, and store the new stretches.
 
     Args:
-        w: Flat workspace; reads F at ``DEFORMATION`` and R at ``ROTATION``, writes the increment (xx, yy, zz, xy, yz,
-            xz, engineering shear) at ``INCREMENT``.
-        state: Flat state of the point, shape (208,); the stretch U at ``STRETCH`` is replaced.
+        w: Flat workspace, entry k of element e at ``16 * k + e``; reads F at ``DEFORMATION`` and R at ``ROTATION`` (row
+            by row), writes the increment (xx, yy, zz, xy, yz, xz, engineering shear) at ``INCREMENT``.
+        state: Flat state of the point in the same order, shape (208,); the six entries of the stretch U at ``STRETCH``
+            are replaced.
     """
     for lane in range(LANES):
         u = stretch(nine(w, ROTATION + lane), nine(w, DEFORMATION + lane))
@@ -207,9 +214,10 @@ def elastic_stress(w, state, elastic):
     """Add C times the strain increment to the stress of sixteen elements at one point, and write the von Mises stress.
 
     Args:
-        w: Flat workspace; reads the increment at ``INCREMENT``, writes the von Mises stress [Pa] at ``MISES``.
-        state: Flat state of the point, entry k of element e at ``16 * k + e``; the stress at ``STRESS`` is updated
-            [Pa].
+        w: Flat workspace; reads the strain increment (xx, yy, zz, xy, yz, xz, engineering shear) at ``INCREMENT``,
+            writes the von Mises stress [Pa] at ``MISES``; entry k of element e at ``16 * k + e``.
+        state: Flat state of the point in the same order, at least 96 entries; the six stresses [Pa] at ``STRESS`` are
+            updated.
         elastic: ``(9,)`` [Pa]: C_xx, C_yy, C_zz, C_xy, C_yz, C_xz (normal), G_xy, G_yz, G_xz.
     """
     for lane in range(LANES):
@@ -225,8 +233,9 @@ def nominal_stress_small(w, state, weight):
     """Write the stress of sixteen elements at one point times the volume of the point, as 3 x 3 matrices.
 
     Args:
-        w: Flat workspace, written at ``NOMINAL`` [J].
-        state: Flat state of the point; reads the stress [Pa].
+        w: Flat workspace; nine entries (row by row) are written at ``NOMINAL`` [J], entry k of element e at
+            ``16 * k + e``.
+        state: Flat state of the point in the same order, shape (208,); reads the six stresses [Pa] at ``STRESS``.
         weight: Volume of the point in each element, shape (16,) [m^3].
     """
     for lane in range(LANES):
@@ -240,8 +249,10 @@ def nominal_stress_finite(w, state, weight):
     """Write the nominal stress P = R s U^-1 of sixteen elements at one point times the volume of the point.
 
     Args:
-        w: Flat workspace; reads R at ``ROTATION``, writes at ``NOMINAL`` [J].
-        state: Flat state of the point; reads the stress s [Pa] and the stretch U.
+        w: Flat workspace; reads R at ``ROTATION``, writes P times volume at ``NOMINAL`` [J], both nine entries row by
+            row, entry k of element e at ``16 * k + e``.
+        state: Flat state of the point in the same order, shape (208,); reads the six stresses s [Pa] at ``STRESS`` and
+            the six entries of the stretch U at ``STRETCH``.
         weight: Initial volume of the point in each element, shape (16,) [m^3].
     """
     for lane in range(LANES):

@@ -66,7 +66,8 @@ def write_gradient(nodes, values, gradient, w):
         values: Nodal vectors such as displacements [m], component c at node a of element e at ``16 * (3 a + c) + e``,
             shape (48 k,).
         gradient: Gradients of the shape functions at the point, in the same order, shape (48 k,) [1/m].
-        w: Flat workspace; the 3 x 3 gradients are written to its first 144 entries.
+        w: Flat workspace; the 3 x 3 gradients are written to its first 144 entries, dv_i / dx_j of element e at
+            ``16 * (3 i + j) + e``.
     """
     for i in range(3):
         row, source = w[3 * LANES * i :], values[LANES * i :]
@@ -85,9 +86,10 @@ def add_point_force(gradient, w, force):
     """Add the force P b_a of one point to each node a of sixteen elements.
 
     Args:
-        gradient: Gradients b_a of the shape functions at the point, order as in ``write_gradient``, shape (48 k,)
-            [1/m].
-        w: Flat workspace; reads the nominal stress times volume at ``NOMINAL`` [J].
+        gradient: Gradients b_a of the shape functions at the point, component c at node a of element e at
+            ``16 * (3 a + c) + e``, shape (48 k,) [1/m].
+        w: Flat workspace; reads the nominal stress P times volume at ``NOMINAL`` [J], entry k (row by row) of element e
+            at ``16 * k + e``.
         force: Nodal forces in the same order, shape (48 k,) [N], added to.
     """
     for start in range(0, len(force), 3 * LANES):
@@ -105,9 +107,11 @@ def strain_increment(w, state, finite):
     """Write the strain increments of sixteen elements at one point from the displacement gradients.
 
     Args:
-        w: Flat workspace; reads the displacement gradient at ``DEFORMATION``, which finite kinematics turn into F.
-        state: Flat state of the point, shape (208,); its strain or stretch is updated.
-        finite: Whether rotations and strains are finite.
+        w: Flat workspace, entry k of element e at ``16 * k + e``; reads the displacement gradient (nine entries) at
+            ``DEFORMATION``, which finite kinematics turn into F; writes the six strain increments at ``INCREMENT``.
+        state: Flat state of the point, shape (208,): six stresses, plastic strain, six strains or stretches per
+            element; the latter are updated.
+        finite: Whether rotations and strains are finite, a boolean.
 
     Returns:
         Whether no element is turned inside out; otherwise the increment is not written.
@@ -128,10 +132,11 @@ def add_point(blocks, b, point, path, w):
 
     Args:
         blocks: ``Blocks`` of elements; state and plastic work of the point are updated.
-        b: Number of the block.
-        point: Number of the point in the elements.
-        path: ``Path``, kinematics and time step.
-        w: Flat workspace with the displacement gradients at ``DEFORMATION``; written at ``NOMINAL`` [J].
+        b: Number of the block, integer.
+        point: Number of the point in the elements, integer.
+        path: ``Path``: small or finite kinematics, and the time step of rate-dependent laws [s].
+        w: Flat workspace, shape (544,), entry k of element e at ``16 * k + e``; reads the displacement gradients at
+            ``DEFORMATION``, writes the nominal stress times volume at ``NOMINAL`` [J], nine entries each.
 
     Returns:
         Whether no element is turned inside out; otherwise the stress is not written.

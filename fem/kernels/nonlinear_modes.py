@@ -36,8 +36,8 @@ def write_normals(w):
     """Write n_k, the gradients of the parent coordinates at the centres of sixteen hexahedra in the middle of the step.
 
     Args:
-        w: Flat workspace of ``ALL_SLOTS`` entries; reads positions at ``MIDDLE`` [m], writes three vectors at
-            ``NORMAL``.
+        w: Flat workspace of ``ALL_SLOTS`` entries, entry k of element e at ``16 * k + e``; reads transformed positions
+            at ``MIDDLE`` [m], writes the three vectors n_1, n_2, n_3 at ``NORMAL``.
     """
     for lane in range(LANES):
         a, b, c = three(w, MIDDLE + X + lane), three(w, MIDDLE + Y + lane), three(w, MIDDLE + Z + lane)
@@ -57,8 +57,9 @@ def write_sums(values, w, at):
     Args:
         values: Stresses or strain increments of each Gauss point, entry i of element e in column ``16 * i + e``, shape
             (8, >= 96).
-        w: Flat workspace, of which 288 entries are written: six sums for each k.
-        at: Position of the first sum in ``w``: ``BEFORE``, ``AFTER`` or ``SUMS``.
+        w: Flat workspace, of which 288 entries are written: the sum of entry i for xi_k of element e at
+            ``at + 16 * (6 (k - 1) + i) + e``.
+        at: Position of the first sum in ``w``, integer: ``BEFORE`` or ``AFTER`` for stresses, ``SUMS`` for strains.
     """
     for i in range(6 * LANES):
         a, b, c, d = values[0, i], values[1, i], values[2, i], values[3, i]
@@ -75,9 +76,10 @@ def write_trial(w, elastic):
     S and T are the sums over the Gauss points of the stresses before the step and of the strain increments.
 
     Args:
-        w: Flat workspace of ``ALL_SLOTS`` entries; reads S at ``BEFORE``, T at ``SUMS``, n_k at ``NORMAL``, writes at
-            ``RESIDUAL``.
-        elastic: Nine scalars [Pa] as in ``kernels.nonlinear.elastic_stress``.
+        w: Flat workspace of ``ALL_SLOTS`` entries, entry k of element e at ``16 * k + e``; reads S_k at ``BEFORE``, T_k
+            at ``SUMS`` (six entries xx, yy, zz, xy, yz, xz for each k), the vectors n_k at ``NORMAL``; writes the three
+            force vectors at ``RESIDUAL``.
+        elastic: Nine scalars [Pa]: C_xx, C_yy, C_zz, C_xy, C_yz, C_xz (normal), G_xy, G_yz, G_xz.
     """
     for lane in range(LANES):
         u, v, t = three(w, NORMAL + lane), three(w, NORMAL + 3 * LANES + lane), three(w, NORMAL + 6 * LANES + lane)
@@ -91,7 +93,12 @@ def write_trial(w, elastic):
 
 @njit(**LANE_OPTIONS)
 def strain_of(a, n):
-    """Return the strain -sym(a (x) n) of two vectors as six scalars xx, yy, zz, xy, yz, xz (engineering shear)."""
+    """Return the strain -sym(a (x) n) as six scalars xx, yy, zz, xy, yz, xz (engineering shear).
+
+    Args:
+        a: Vector of three scalars, such as the step of a mode.
+        n: Vector of three scalars, such as the gradient of the mode.
+    """
     return (
         -a[0] * n[0],
         -a[1] * n[1],
@@ -107,8 +114,8 @@ def add_remainder(w, energy):
     """Subtract the work of the residual forces on the modes in a step from the hourglass energy of sixteen hexahedra.
 
     Args:
-        w: Flat workspace of ``ALL_SLOTS`` entries: sums of the stresses at ``BEFORE`` and ``AFTER`` [Pa], strains of
-            the modes at ``SUMS``.
+        w: Flat workspace of ``ALL_SLOTS`` entries, entry k of element e at ``16 * k + e``: sums of the stresses before
+            and after the step at ``BEFORE`` and ``AFTER`` [Pa], strains of the modes at ``SUMS``, 18 entries each.
         energy: Hourglass energy, shape (16,) [J], updated.
     """
     for lane in range(LANES):
@@ -125,7 +132,7 @@ def elastic_block(m, n, elastic):
     Args:
         m: Gradient of the first field, three scalars.
         n: Gradient of the second field, three scalars.
-        elastic: Nine scalars [Pa] as in ``kernels.nonlinear.elastic_stress``.
+        elastic: Nine scalars [Pa]: C_xx, C_yy, C_zz, C_xy, C_yz, C_xz (normal), G_xy, G_yz, G_xz.
     """
     xx, yy, zz, xy, yz, xz, gxy, gyz, gxz = elastic
     return (
@@ -146,10 +153,11 @@ def write_operator(w, coupling, elastic):
     """Write the elastic operator of the three modes of sixteen hexahedra as six 3 x 3 blocks: 11 22 33 12 23 13.
 
     Args:
-        w: Flat workspace of ``ALL_SLOTS`` entries; reads n_k at ``NORMAL``, writes the blocks at ``OPERATOR``.
-        coupling: Sums of xi_k xi_l / w over the Gauss points in the same order, six of sixteen elements, shape (96,)
-            [1/m^3].
-        elastic: Nine scalars [Pa] as in ``kernels.nonlinear.elastic_stress``.
+        w: Flat workspace of ``ALL_SLOTS`` entries, entry k of element e at ``16 * k + e``; reads the three vectors n_k
+            at ``NORMAL``, writes the blocks (nine entries each, row by row) at ``OPERATOR``.
+        coupling: Sums of xi_k xi_l / w over the Gauss points for kl = 11 22 33 12 23 13, sum i of element e at
+            ``16 * i + e``, shape (96,) [1/m^3].
+        elastic: Nine scalars [Pa]: C_xx, C_yy, C_zz, C_xy, C_yz, C_xz (normal), G_xy, G_yz, G_xz.
     """
     for lane in range(LANES):
         u, v, t = three(w, NORMAL + lane), three(w, NORMAL + 3 * LANES + lane), three(w, NORMAL + 6 * LANES + lane)
@@ -192,8 +200,9 @@ def solve_modes(w):
     The nine unknowns of a lane are solved by block elimination with 3 x 3 blocks.
 
     Args:
-        w: Workspace, flat with ``ALL_SLOTS`` entries: reads the slots ``OPERATOR`` [N/m], ``RESIDUAL`` [N] and
-            ``NORMAL``, and replaces the three strains (six entries each) at ``SUMS``.
+        w: Flat workspace of ``ALL_SLOTS`` entries, entry k of element e at ``16 * k + e``: reads six 3 x 3 blocks of
+            the operator at ``OPERATOR``, three vectors of residual forces at ``RESIDUAL`` and three mode gradients at
+            ``NORMAL``; replaces the three strains (xx, yy, zz, xy, yz, xz each) at ``SUMS``.
     """
     for lane in range(LANES):
         a12, a23 = nine(w, OPERATOR + 27 * LANES + lane), nine(w, OPERATOR + 36 * LANES + lane)

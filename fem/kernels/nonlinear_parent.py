@@ -23,7 +23,14 @@ PAIRS = ((0, 1, 2, 3, 4, 5, 6, 7), (0, 2, 1, 3, 4, 6, 5, 7), (0, 4, 1, 5, 2, 6, 
 
 @njit(**LANE_OPTIONS)
 def places(g):
-    """Return the positions in ``edges`` of the derivatives along x, y, z at Gauss point ``g`` (0 to 7)."""
+    """Return where the derivatives at a Gauss point begin in an array that ``write_edges`` has written.
+
+    Args:
+        g: Number of the Gauss point, 0 to 7; bits 0, 1 and 2 are its sides along x, y and z.
+
+    Returns:
+        Positions of the first component of the first element, for derivatives along x, y and z, three integers.
+    """
     x, y, z = g & 1, (g >> 1) & 1, (g >> 2) & 1
     return LANES * (3 * y + 6 * z), LANES * (12 + 3 * x + 6 * z), LANES * (24 + 3 * x + 6 * y)
 
@@ -33,10 +40,12 @@ def write_edges(w, field, edges, start):
     """Write the derivatives of a vector field at the Gauss points of sixteen hexahedra.
 
     Args:
-        w: Flat workspace with the transformed nodal values of the field, 24 entries of sixteen elements.
-        field: Position of these values in ``w``.
-        edges: Written: derivatives in the order of the module, 36 entries of sixteen elements, shape (>= start + 576,).
-        start: Position of the first derivative in ``edges``.
+        w: Flat workspace with the transformed nodal values of the field (sums and differences over the corners), 24
+            entries of sixteen elements: entry k of element e at ``field + 16 * k + e``.
+        field: Position of these values in ``w``, integer.
+        edges: Written, shape (>= start + 576,): component c along direction d, at the sides i (0 to 3) of the other two
+            directions, of element e at ``start + 16 * (3 (4 d + i) + c) + e``.
+        start: Position of the first derivative in ``edges``, integer.
     """
     for d in range(3):
         own, first, second = LINES[d]
@@ -52,8 +61,9 @@ def write_modes(forces, w):
     """Write the forces on the transformed nodal values of sixteen hexahedra, the transpose of ``write_edges``.
 
     Args:
-        forces: Forces on the derivatives at each Gauss point: along x, y, z, three components each, shape (8, 144) [J].
-        w: Flat workspace; its first 384 entries are overwritten.
+        forces: Forces on the derivatives at each Gauss point: component c along direction d of element e in column
+            ``16 * (3 d + c) + e``, shape (8, 144), in the unit of the nodal forces.
+        w: Flat workspace; its first 384 entries are overwritten by the forces on the 24 transformed nodal values.
     """
     for k in range(24 * LANES):
         w[k] = 0.0
@@ -76,10 +86,10 @@ def write_fit(values, at, weight, basis, fitted):
 
     Args:
         values: Row of each Gauss point, shape (8, >= at + 16).
-        at: Column of the scalar of the first element.
+        at: Column of the scalar of the first element, integer; that of element e is ``at + e``.
         weight: Volume of each Gauss point, shape (8, 16) [m^3].
-        basis: Four functions at the eight points, orthonormal under the weights, function by function, point by point,
-            shape (512,).
+        basis: Four linear functions, orthonormal under the weights; function k at point g of element e at
+            ``16 * (8 k + g) + e``, shape (512,).
         fitted: Written: fitted value at point g of element e at ``16 * g + e``, shape (128,).
     """
     for k in range(8 * LANES):

@@ -152,7 +152,11 @@ class HenckyElements:
 
 
 def free_expansion(materials: Sequence[Material], change: float) -> NDArray[np.float64]:
-    """Return the free thermal strain of materials along x, y, z, shape (nm, 3), for a temperature change [K].
+    """Return the free thermal strain of materials along their axes x, y, z, shape (nm, 3).
+
+    Args:
+        materials: Materials, nm of them.
+        change: Temperature change [K].
 
     Raises:
         ValueError: A material has no thermal expansion.

@@ -114,11 +114,12 @@ def with_initial_stress(
     """Return a body with the residual stress of cooling; collective over its model.
 
     Args:
-        body: Stress-free body at rest.
+        body: Stress-free body at rest on this rank.
         materials: Material of each index of its elements.
-        displacement: Displacement of cooling, shape (n, 3) [m].
+        displacement: Displacement of cooling at the n nodes of this rank, shape (n, 3) [m].
         change: Temperature change [K].
-        path: Whether an element of any model yields or has finite rotations.
+        path: Whether an element of any model yields or has finite rotations; if not, no forces are added, since a
+            stress in equilibrium does not change linear motion.
     """
     initial = _mean_stress(body, materials, displacement, change)
     begin = partial(_set_initial_points, materials=materials, displacement=displacement, change=change)

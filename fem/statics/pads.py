@@ -37,9 +37,14 @@ class Pads:
 
 
 def pad_matrix(mesh: MeshData, pads: Pads) -> scipy.sparse.csr_matrix:
-    """Return the matrix P from nodal displacements to pad motions, shape (12 joints, 3 n).
+    """Return the sparse matrix P from nodal displacements to pad motions, shape (12 joints, 3 n).
 
-    Rows are ordered by joint, side, displacement and rotation.
+    The six motions of a pad are the mean displacement [m] and rotation [rad] of its wetted disc along x, y, z. Rows are
+    ordered by joint, side (board, package), displacement and rotation; columns by node and component.
+
+    Args:
+        mesh: Mesh of board and package, n nodes.
+        pads: Names, centres and radii of the wetted discs of all joints.
 
     Raises:
         MeshError: A wetted disc extends beyond the face of its side.
@@ -73,10 +78,14 @@ def _side_matrix(mesh: MeshData, side: str, pads: Pads, number: int) -> scipy.sp
 
 
 def disc_rule(rings: int, angles: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return a quadrature rule on the unit disc: points, shape (q, 3), and area fractions, shape (q,).
+    """Return a quadrature rule on the unit disc: points, shape (q, 3), with z = 0, and area fractions, shape (q,).
 
     The rule is a product of Gauss points in the squared radius and equally spaced angles, symmetric about both axes. It
     is exact for polynomials of degree 2 rings - 1 in the squared radius and below ``angles`` in the angle.
+
+    Args:
+        rings: Number of radii.
+        angles: Number of angles on each radius; q = rings * angles.
     """
     nodes, weights = np.polynomial.legendre.leggauss(rings)
     radius = np.repeat(np.sqrt(0.5 * (1.0 + nodes)), angles)

@@ -95,7 +95,16 @@ class HeatedStructure(Protocol):
 
 
 def check_loads(modes: RigidModes, wrenches: NDArray[np.float64], rigid: NDArray[np.float64]) -> None:
-    """Raise ``ValueError`` if wrenches or rigid motions have a wrong shape or are not finite."""
+    """Check the shapes of loads on a package that is held by its solder, and that they are finite.
+
+    Args:
+        modes: Rigid-body motions of the package, k of them.
+        wrenches: Force [N] and moment [N m] on each pad, shape (joints, 2, 6); side 0 is the board, 1 the package.
+        rigid: Amplitudes of the rigid-body motions [m, rad], shape (k,).
+
+    Raises:
+        ValueError: A shape is wrong, or a value is not finite.
+    """
     for name, values, expected in (
         ("wrenches", wrenches, modes.pad_motion.shape[1:]),
         ("rigid", rigid, modes.weight.shape),

@@ -84,7 +84,14 @@ class ThermalTables(Tables):
 
 
 def connect_board(mesh: MeshData) -> MeshData:
-    """Return the mesh with the nodes of board and board patch merged."""
+    """Return the mesh with the nodes of board and board patch merged.
+
+    Args:
+        mesh: Mesh in which the patch under the package has its own nodes; unchanged without board or patch.
+
+    Raises:
+        CouplingError: A node of the patch has no partner in the board.
+    """
     macro, meso = find_interface(mesh)
     return merge_nodes(mesh, meso, macro)[0]
 
