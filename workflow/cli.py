@@ -87,7 +87,7 @@ def plan(
         bool, typer.Option("--json", help="print stages, effects and predicted times for a script")
     ] = False,
 ) -> None:
-    """Show stages that a run would execute, their reasons and predicted cost, as tables or JSON; nothing is computed."""
+    """Show the stages that a run would execute, why, and their predicted cost, without running them."""
     from reflowshock.workflow.plan import plan_record, show_plan
     from reflowshock.workflow.run import WHAT
 
@@ -166,11 +166,7 @@ def accuracy(
     oversubscribe: Oversubscribe = False,
     force: Force = False,
 ) -> None:
-    """Run a convergence study: errors and costs of settings; recommend settings and run them.
-
-    With --budget alone the most accurate settings within that time are recommended, otherwise the cheapest ones within
-    the tolerance. The exit code is 0 if these were run and are within the tolerance, else 1.
-    """
+    """Run a convergence study; recommend and run the cheapest settings within a tolerance, or the best in a budget."""
     from reflowshock.workflow.accuracy.command import read_request, show
 
     request = replace(read_request(case, settings or [], tolerance, budget), oversubscribe=oversubscribe, force=force)
@@ -188,7 +184,7 @@ def status(
         bool, typer.Option("--follow", "-f", help="watch a run that another terminal has started, until it ends")
     ] = False,
 ) -> None:
-    """Show stages done, stale, damaged or missing in the run folder of a case, with times and results; change nothing."""
+    """Show stages done, stale, damaged or missing in a run folder, with times and key results; changes nothing."""
     from reflowshock.workflow.status import follow_run, show_status
 
     store, point = _load(case, settings, out, True, True)
@@ -230,7 +226,7 @@ def report(
 
 @app.command()
 def verify(case: CasePath, settings: Settings = None, out: Out = None) -> None:
-    """Verify that all products in the run folder exist and are unchanged: exit code 0 if so, else 1; changes nothing."""
+    """Verify that all products in a run folder exist and are unchanged: exit code 0 if so, else 1."""
     from reflowshock.workflow.run import verify as verify_run
 
     raise typer.Exit(0 if verify_run(*_load(case, settings, out, True, True)) else 1)
@@ -269,10 +265,7 @@ def stress_test(
     ] = None,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="results")] = Path("runs/stress-test"),
 ) -> None:
-    """Run hard and random cases, check that each stays within its bounds, and write the results to --out.
-
-    --family selects kinds of cases. The exit code is 0 if no case exceeds its bounds, else 1.
-    """
+    """Run hard and random cases and check that each stays within its bounds; write results, exit code 0 if all do."""
     from reflowshock.workflow.stress_test.command import RANDOM_COUNT, Request
     from reflowshock.workflow.stress_test.command import stress_test as try_cases
 
@@ -313,7 +306,7 @@ def study(
     force: Force = False,
     yes: Yes = False,
 ) -> None:
-    """Run a parametric study: compute missing points, write tables, plots and a page; exit code 0 if all are healthy."""
+    """Run a parametric study: compute only missing points, write tables, plots and a page; exit code 0 if healthy."""
     from reflowshock.workflow.jobs.batch import machine_of
     from reflowshock.workflow.pipeline.gate import ask_if_long
     from reflowshock.workflow.study.command import predicted_study_seconds, read_points_of, run_study, show_forecast
