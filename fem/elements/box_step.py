@@ -15,13 +15,13 @@ NODES = {"hexahedron": 8, "tetrahedron": 4, "tetrahedron_quadratic": 10}
 
 
 def box_element_step(element: str, formulation: str, material: Material, size: NDArray[np.float64]) -> float:
-    """Return the smallest critical time step [s] of the elements into which a box is divided.
+    """Return the smallest critical time step of central differences [s] of the elements into which a box is divided.
 
     Args:
         element: Element name of case files: ``hexahedron`` (one element), ``tetrahedron`` or ``tetrahedron_quadratic``.
             The six tetrahedra share one diagonal of the box; a mesh may use another one.
-        formulation: Formulation of hexahedra, see ``element.element_kind``; not used for tetrahedra.
-        material: Material with axes along x, y and z.
+        formulation: Formulation of hexahedra, ``incompatible_modes`` or ``one_point``; not used for tetrahedra.
+        material: Elastic material and density, with axes along x, y and z.
         size: Edge lengths of the box, shape (3,) [m].
     """
     points, cells = (CORNERS, np.arange(8)[None]) if element == "hexahedron" else diagonal_tetrahedra()
@@ -40,7 +40,12 @@ def box_element_step(element: str, formulation: str, material: Material, size: N
 
 
 def diagonal_tetrahedra() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return points (8, 3) and cells (6, 4) of the unit cube cut into six tetrahedra at a diagonal (Kuhn)."""
+    """Return the unit cube cut into six tetrahedra that share a diagonal (Kuhn).
+
+    Returns:
+        Corners of the cube in tensor order, shape (8, 3), and corners of each tetrahedron, shape (6, 4), with positive
+        volume.
+    """
     cells = np.array([[0, 1 << a, 1 << a | 1 << b, 7] for a, b, _ in permutations(range(3))])
     edges = CORNERS[cells[:, 1:]] - CORNERS[cells[:, :1]]
     inside_out = np.linalg.det(edges) < 0.0
@@ -51,13 +56,16 @@ def diagonal_tetrahedra() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
 def with_middle_nodes(
     points: NDArray[np.float64], cells: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return points ``(n', 3)`` and 10-node cells ``(ne, 10)`` of tetrahedra with nodes added at the edge midpoints.
+    """Return 10-node tetrahedra, with nodes added at the edge midpoints of 4-node tetrahedra.
 
     Neighbours do not share the new nodes, which does not matter for critical steps of single elements.
 
     Args:
         points: Vertices, shape (n, 3) [m].
         cells: Vertices of each tetrahedron, shape (ne, 4).
+
+    Returns:
+        Vertices followed by midpoints, shape (n + 6 ne, 3) [m]; four vertices and six midpoints of each cell, (ne, 10).
     """
     middles = points[cells[:, EDGES]].mean(axis=2)
     numbers = len(points) + np.arange(middles.shape[0] * middles.shape[1]).reshape(middles.shape[:2])

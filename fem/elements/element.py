@@ -41,11 +41,14 @@ class Elements:
 
 
 def element_kind(nodes: int, formulation: str = HEXAHEDRON.name) -> ElementKind:
-    """Return the kind of element by its number of nodes and, for hexahedra, its formulation.
+    """Return the kind of element, with its integrals and stiffness, by number of nodes and formulation.
 
     Args:
         nodes: 4 or 10 for tetrahedra, 8 for hexahedra.
-        formulation: Name of the formulation in case files; counts only for hexahedra.
+        formulation: ``incompatible_modes`` or ``one_point`` for hexahedra; not used for tetrahedra.
+
+    Raises:
+        KeyError: No element has that number of nodes or that formulation.
     """
     if nodes == HEXAHEDRON.nodes:
         return {kind.name: kind for kind in (HEXAHEDRON, ONE_POINT)}[formulation]
@@ -53,14 +56,14 @@ def element_kind(nodes: int, formulation: str = HEXAHEDRON.name) -> ElementKind:
 
 
 def element_geometry(points: NDArray[np.float64], cells: NDArray[np.int32]) -> Geometry:
-    """Return the integrals over elements; formulations with the same nodes share them.
+    """Return nodal volumes, mean gradients and lowest Jacobian determinants of elements; formulations share them.
 
     Args:
         points: Nodes, shape (n, 3) [m].
-        cells: Nodes of each element, shape (ne, k).
+        cells: Nodes of each element, shape (ne, k), k = 4, 8 or 10.
 
     Raises:
-        MeshError: An element is turned inside out.
+        MeshError: The Jacobian determinant of an element is not positive at an integration point.
     """
     result = element_kind(cells.shape[1]).geometry(points[cells])
     lowest = result.lowest
@@ -87,7 +90,7 @@ def lumped_mass(elements: Elements, nodal_volume: NDArray[np.float64]) -> NDArra
     """Return the lumped mass of each node, shape (n,) [kg]; not summed over ranks.
 
     Args:
-        elements: Elements with their density.
+        elements: Elements of this rank, with density, at n points.
         nodal_volume: Volume of each node in each element, shape (ne, k) [m^3].
     """
     mass = np.zeros(len(elements.points))
@@ -108,7 +111,7 @@ def critical_steps(
     Args:
         elements: Elements of one kind.
         nodal_volume: Volume of each node in each element, shape (ne, k) [m^3].
-        stiffness: Function that returns the stiffness of elements, shape (ne, 3k, 3k) [N/m].
+        stiffness: Function of some of the elements that returns their stiffness, shape (ne, 3k, 3k) [N/m].
     """
     first, shape = classes(elements)
     frequency = np.empty(len(first))
@@ -127,8 +130,8 @@ def classes(elements: Elements) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
         elements: Elements of one kind.
 
     Returns:
-        Index of one element of each class, shape (nc,), and class of each element, shape (ne,) int32. Shapes count as
-        equal within 1e-12 of the extent of the model.
+        Index of one element of each class, shape (nc,), and class 0 to nc - 1 of each element, shape (ne,) int32.
+        Shapes count as equal within 1e-12 of the extent of the model.
     """
     corners = elements.points[elements.cells]
     extent = float(np.ptp(elements.points, axis=0).max())

@@ -22,10 +22,10 @@ def elements_of(
 
     Args:
         points: Nodes, shape (n, 3) [m].
-        cells: Nodes of each cell, shape (ne, k).
-        part: Part of each cell, shape (ne,).
-        materials: Material of each part.
-        formulation: Formulation of hexahedra, see ``element.element_kind``.
+        cells: Nodes of each cell, shape (ne, k), k = 4, 8 or 10; tensor order for hexahedra.
+        part: Index of each cell into ``materials``, shape (ne,).
+        materials: Material of each part: elasticity and density.
+        formulation: Formulation of hexahedra, ``incompatible_modes`` or ``one_point``; not used for tetrahedra.
     """
     return Elements(
         points=points,

@@ -54,7 +54,7 @@ def hourglass_control(
     """Return the hourglass modes of hexahedra and their stiffness.
 
     Args:
-        corners: Nodes of each element, shape (ne, 8, 3) [m].
+        corners: Node positions of each element in tensor order, shape (ne, 8, 3) [m].
         elasticity: Elasticity of each material, shape (nm, 6, 6) [Pa].
         material: Index of each element into ``elasticity``, shape (ne,).
 

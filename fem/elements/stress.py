@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 
 def mean_strain(gradient: NDArray[np.float64], displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the average strain of elements ``(m, 6)`` (xx yy zz xy yz xz), with engineering shear strain.
+    """Return the average strain of elements, xx yy zz xy yz xz with engineering shear, shape (m, 6).
 
     Args:
         gradient: Mean gradients of the shape functions, shape (m, k, 3) [1/m].
@@ -54,7 +54,9 @@ def voigt(matrices: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def principal_strain(corners: NDArray[np.float64], displacement: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the largest and the smallest in-plane principal strain ``(2, f)`` at the centres of facets normal to z.
+    """Return the largest (row 0) and smallest (row 1) in-plane principal strain at facet centres, shape (2, f).
+
+    The facets are quadrilaterals normal to z.
 
     Args:
         corners: In-plane corners in cyclic order, shape (f, 4, 2) [m].

@@ -24,7 +24,7 @@ def quadratic_derivatives(barycentric: NDArray[np.float64]) -> NDArray[np.float6
     """Return the derivatives dN_a/dxi_d of the ten quadratic shape functions of a tetrahedron, shape (q, 10, 3).
 
     Args:
-        barycentric: Points in barycentric coordinates, shape (q, 4); xi_d is coordinate d + 1.
+        barycentric: Points in barycentric coordinates, shape (q, 4); xi_d (d = 0 to 2) is coordinate d + 1.
     """
     vertices = (4.0 * barycentric - 1.0)[:, :, None] * BARYCENTRIC
     first, second = EDGES.T

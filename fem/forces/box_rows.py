@@ -46,7 +46,7 @@ class BoxRows:
 
 
 def lines(points: NDArray[np.float64], cells: NDArray[np.int32]) -> NDArray[np.int64]:
-    """Return the nodes of boxes line by line along x, neighbouring lines close together, shape (p,).
+    """Return each node of boxes once, line by line along x (ascending), lines sorted by z, then y, shape (p,).
 
     Args:
         points: Nodes, shape (n, 3) [m].
@@ -65,11 +65,12 @@ def runs(starts: NDArray[np.int64], shape: NDArray[np.int32]) -> NDArray[np.int6
     """Join consecutive boxes of equal class into rows of at most ``LONGEST`` boxes.
 
     Args:
-        starts: Positions of the four low corners of each box, shape (ne, 4).
+        starts: Positions in the lines of the four corners at low x of each box, shape (ne, 4); consecutive boxes are
+            those at which all four grow by one.
         shape: Class of each box, shape (ne,).
 
     Returns:
-        Rows as in ``BoxRows.rows``, shape (nr, 6).
+        Positions of the four low corners of the first box of each row, number of boxes, class; shape (nr, 6).
     """
     order = np.argsort(starts[:, 0], kind="stable")
     starts, shape = starts[order], shape[order]

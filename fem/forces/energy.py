@@ -42,10 +42,10 @@ class InternalForce(Protocol):
 
 
 def linear_energy(term: InternalForce, displacement: NDArray[np.float64], mean: MeanStrain | None) -> Energy:
-    """Return the energy u . K u / 2 of a linear force term.
+    """Return the energy u . K u / 2 of a linear force term on this rank [J].
 
     Args:
-        term: Force term that is linear in the displacement.
+        term: Force term with a linear internal force K u.
         displacement: Nodal displacement u, shape (n, 3) [m].
         mean: Mean strains of elements with hourglass control, which split the energy into strain and hourglass energy;
             None if all of it is strain energy.

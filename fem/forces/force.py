@@ -69,10 +69,13 @@ def force_terms(
 
     Args:
         elements: Elements of this rank.
-        materials: Material of each index of ``elements.elasticity``.
-        kinematics: Small, corotational or finite.
+        materials: Material of each index of ``elements.elasticity``, nm of them.
+        kinematics: "small", "corotational" (finite rotations, small elastic strains) or "finite" strains.
         step: Time step of rate-dependent laws [s]; infinity means quasi-static.
-        laws: UFL laws by index of ``elements.elasticity``, which replace the materials.
+        laws: UFL laws by index of ``elements.elasticity``, which replace the materials; empty without UFL.
+
+    Returns:
+        Terms whose sum is the internal force; empty without elements.
     """
     library = ~np.isin(elements.material, list(laws))
     return terms_of(elements, library, materials, kinematics, step) + _ufl_terms(elements, laws)
@@ -81,13 +84,15 @@ def force_terms(
 def terms_of(
     elements: Elements, chosen: NDArray[np.bool_], materials: Sequence[Material], kinematics: Kinematics, step: float
 ) -> list[ForceTerm]:
-    """Return the force terms of selected elements, numbered as all elements.
+    """Return the force terms of selected elements, without UFL laws: linear, corotational and path-dependent ones.
+
+    The terms use the node and element numbers of all elements.
 
     Args:
         elements: Elements of this rank.
         chosen: Whether an element is selected, shape (ne,).
         materials: Material of each index of ``elements.elasticity``.
-        kinematics: Small, corotational or finite.
+        kinematics: "small", "corotational" (finite rotations, small elastic strains) or "finite" strains.
         step: Time step of rate-dependent laws [s]; infinity means quasi-static.
     """
     plastic = np.array([plastic_constants(material) for material in materials])
@@ -117,7 +122,7 @@ def linear_terms(elements: Elements) -> list[ForceTerm]:
     """Return the force terms of linear elastic elements at small rotations: one for boxes, one for all others.
 
     Args:
-        elements: Elements of this rank; may be empty.
+        elements: Elements of this rank; without any, the list is empty.
     """
     box = in_rows(elements)
     terms: list[ForceTerm] = []

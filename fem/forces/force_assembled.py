@@ -55,11 +55,14 @@ class AssembledElements:
 
 
 def upper_pattern(cells: NDArray[np.int32], count: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Return row pointers (count + 1,) and sorted columns (nb,) of the upper triangle of the node graph.
+    """Return the sparsity pattern of the upper triangle (with diagonal) of a matrix over nodes, in compressed rows.
 
     Args:
-        cells: Nodes of each element, shape (ne, k).
+        cells: Nodes of each element, shape (ne, k); nodes of an element are coupled with each other.
         count: Number of nodes.
+
+    Returns:
+        First entry of each row, and the number of entries, shape (count + 1,); columns, ascending in a row, (nb,).
     """
     membership = scipy.sparse.csr_matrix(
         (np.ones(cells.size, np.int32), (cells.ravel(), np.repeat(np.arange(len(cells)), cells.shape[1]))),

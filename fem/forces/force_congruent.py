@@ -72,7 +72,15 @@ class CongruentElements:
 
 
 def arrange_in_rows(elements: Elements) -> tuple[Elements, tuple[int, int, int], BoxRows, NDArray[np.int64]]:
-    """Return boxes in the frame with the longest rows, the axes of that frame, the rows, and a box of each shape."""
+    """Arrange boxes in rows along the axis that gives the fewest rows.
+
+    Args:
+        elements: Hexahedra that are boxes along the axes (``is_box``).
+
+    Returns:
+        Boxes in the frame of the rows (components of nodes and elasticity permuted, nodes in tensor order); coordinate
+        directions 0 to 2 in the order of that frame; rows; number of one box of each shape and material, shape (ns,).
+    """
     first, shape = classes(replace(align_boxes(elements), density=np.zeros(len(elements.cells))))
     candidates = []
     for axes in TURNS:
@@ -89,7 +97,11 @@ def _turn_elements(elements: Elements, axes: tuple[int, int, int]) -> Elements:
 
 
 def is_box(corners: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which elements with corners ``(ne, k, 3)`` are boxes along the axes, in any node order: shape (ne,)."""
+    """Return which elements are boxes with edges along the axes, in any node order, shape (ne,).
+
+    Args:
+        corners: Node positions of each element, shape (ne, k, 3) [m]; only hexahedra (k = 8) can be boxes.
+    """
     if corners.shape[1] != 8:
         return np.zeros(len(corners), dtype=bool)
     low, high = corners.min(axis=1, keepdims=True), corners.max(axis=1, keepdims=True)
@@ -102,13 +114,23 @@ def is_box(corners: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def in_rows(elements: Elements) -> NDArray[np.bool_]:
-    """Return which elements ``(ne,)`` form a term of boxes: all boxes, but none if a mixed mesh has only a ``FEW``."""
+    """Return which elements are computed as rows of boxes, shape (ne,).
+
+    All boxes are, but none if there are fewer than ``FEW`` (64) of them among elements of other shapes.
+
+    Args:
+        elements: Elements of one kind; may be empty.
+    """
     box = is_box(elements.points[elements.cells])
     return box if box.all() or np.sum(box) >= FEW else np.zeros_like(box)
 
 
 def align_boxes(elements: Elements) -> Elements:
-    """Return a copy of boxes whose nodes are reordered so that bit d of a local index is the side in direction d."""
+    """Return a copy of boxes with their nodes in tensor order: bit d of a local index is the side in direction d.
+
+    Args:
+        elements: Hexahedra that are boxes along the axes (``is_box``), in any node order.
+    """
     corners = elements.points[elements.cells]
     upper = corners > 0.5 * (corners.min(axis=1, keepdims=True) + corners.max(axis=1, keepdims=True))
     order = np.argsort(upper @ np.array([1, 2, 4]), axis=1)
@@ -123,10 +145,11 @@ def parity_blocks(stiffness: NDArray[np.float64]) -> NDArray[np.float64]:
         stiffness: Stiffness of each shape, nodes in tensor order, shape (ns, 24, 24) [N/m].
 
     Returns:
-        The 3 x 3 block of each parity over 8, in symmetric storage (00 01 02 11 12 22), shape (ns, 8, 6) [N/m].
+        The 3 x 3 block of each parity (bit d: odd along direction d) divided by 8, entries 00 01 02 11 12 22, shape
+        (ns, 8, 6) [N/m]. Component c of the block of parity p belongs to the mode of parity p XOR 2^c.
 
     Raises:
-        ValueError: A stiffness lacks the mirror symmetry of a box.
+        ValueError: A stiffness lacks the three mirror planes of a box.
     """
     tensor = stiffness.reshape(-1, 8, 3, 8, 3)
     modes = np.einsum("pa,saibj,qb->spiqj", SIGNS, tensor, SIGNS, optimize=True) / 8.0

@@ -220,7 +220,7 @@ def corotational_terms(everything: Elements, chosen: NDArray[np.bool_]) -> list[
     """Return the force terms of selected hexahedra: one for boxes and one for other shapes; empty if none is selected.
 
     Args:
-        everything: All elements of this rank.
+        everything: All elements of this rank, hexahedra where selected.
         chosen: Whether an element is selected, shape (ne,).
     """
     box = is_box(everything.points[everything.cells])
@@ -230,11 +230,11 @@ def corotational_terms(everything: Elements, chosen: NDArray[np.bool_]) -> list[
 
 
 def corotational_boxes(everything: Elements, chosen: NDArray[np.int64]) -> CorotationalBoxes | CorotationalBlocks:
-    """Return one force term of selected boxes: in rows, or in blocks of sixteen if the rows are short.
+    """Return one force term of selected boxes: in rows, or in blocks of sixteen if rows have fewer than 8 on average.
 
     Args:
         everything: All elements of this rank.
-        chosen: Numbers of the boxes among them, shape (k,).
+        chosen: Numbers of the selected boxes among all elements, at least one, shape (k,).
     """
     rows = CorotationalBoxes.build(everything, chosen)
     return rows if len(chosen) >= SHORT_ROWS * len(rows.rows) else CorotationalBlocks.build(everything, chosen)
@@ -247,7 +247,12 @@ def _split_energies(energies: tuple[float, float], hourglass: bool) -> Energy:
 
 
 def inverted(group: str, start: NDArray[np.float64]) -> InvertedElementError:
-    """Return the error of a group of boxes (a row or block) that begins at a point ``(3,)`` [m]."""
+    """Return the error, not raised here, of a group of elements of which one is turned inside out.
+
+    Args:
+        group: Kind of the group in the message, such as "the row" or "the block".
+        start: First node of the group, shape (3,) [m].
+    """
     coordinates = ", ".join(f"{value:.6g}" for value in start)
     return InvertedElementError(f"an element in {group} that begins near ({coordinates}) m is turned inside out")
 
@@ -256,12 +261,12 @@ def box_constants(shapes: Elements, size: NDArray[np.float64]) -> NDArray[np.flo
     """Return the constants of the corotational force of boxes.
 
     Args:
-        shapes: One aligned box of each shape, in the frame of the rows.
+        shapes: One box of each shape, ns of them, nodes in tensor order, in the frame of the rows.
         size: Edge lengths of each shape, shape (ns, 3) [m].
 
     Returns:
-        V times C_xx, C_yy, C_zz, C_xy, C_yz, C_xz, G_xy, G_yz, G_xz [J], then the entries of ``HIGHER`` [N/m],
-        shape (ns, 27).
+        Volume V times C_xx, C_yy, C_zz, C_xy, C_yz, C_xz, G_xy, G_yz, G_xz [J], then the 18 stiffnesses of the modes
+        xy, xz, yz, xyz in the order of ``HIGHER`` [N/m], shape (ns, 27).
     """
     elasticity = shapes.elasticity[shapes.material] * size.prod(axis=1)[:, None, None]
     rows, columns = np.transpose((*NORMAL, (3, 3), (4, 4), (5, 5)))

@@ -257,7 +257,14 @@ class Means:
 
 
 def view_by_lane(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a view with the lanes as second axis, ``(nb, 16, ...)``, of an array of blocks with lanes innermost."""
+    """Return a view of block values with the sixteen lanes (elements of a block) as second axis.
+
+    Args:
+        values: Values of blocks, element innermost, shape (nb, ..., 16 k).
+
+    Returns:
+        View, shape (nb, 16, ..., k).
+    """
     split = values.reshape(*values.shape[:-1], -1, LANES)
     return np.moveaxis(split, -1, 1)
 
@@ -266,7 +273,8 @@ def elastic_energy(blocks: AnyBlocks, elasticity: NDArray[np.float64]) -> NDArra
     """Return the elastic energy s : C^-1 : s / 2 of each element of each block, shape (nb, 16) [J].
 
     Args:
-        blocks: Elements in blocks of sixteen, with stresses and volumes; elements after the last one repeat it.
+        blocks: Elements in blocks of sixteen, with stresses and volumes; elements after the last one repeat it, and so
+            does their energy.
         elasticity: Elasticity of each material, shape (nm, 6, 6) [Pa].
     """
     points = blocks.state.shape[1]

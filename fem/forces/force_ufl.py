@@ -188,7 +188,14 @@ class _Internal:
 
 
 def tangent_at_rest(elements: Elements, law: Law) -> NDArray[np.float64]:
-    """Return the stiffness ``(ne, 3k, 3k)`` [N/m] of each element at rest (instantaneous response), node by node."""
+    """Return the stiffness of each element at rest, node by node, shape (ne, 3k, 3k) [N/m].
+
+    Internal variables of the law are updated with the displacement: the response is instantaneous.
+
+    Args:
+        elements: Elements of one kind with k nodes; their own materials are not used.
+        law: Material law in UFL for all of them.
+    """
     count, nodes = elements.cells.shape
     apart = np.arange(count * nodes).reshape(count, nodes)
     space = Space(elements.points[elements.cells].reshape(-1, 3), apart)

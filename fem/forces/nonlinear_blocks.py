@@ -63,7 +63,10 @@ def arrange(elements: Elements, group: NDArray[np.integer]) -> Lanes:
 
     Args:
         elements: Elements of one kind.
-        group: Group of each element, such as its material, shape (ne,).
+        group: Group of each element, such as its material, shape (ne,), not negative.
+
+    Returns:
+        Order of the elements: element of each lane (nb, 16), elements per block, and the shapes that blocks share.
     """
     first, shape = classes(replace(elements, density=np.zeros(len(elements.cells))))
     order = np.lexsort((elements.cells.min(axis=1), shape, group))
@@ -89,7 +92,15 @@ def in_blocks(order: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.i
 
 
 def merge_equal_materials(elements: Elements, plastic: NDArray[np.float64]) -> tuple[Elements, NDArray[np.float64]]:
-    """Return elements and plastic constants ``(nm, 6)`` with equal materials merged, since many parts share one."""
+    """Merge equal materials, since many parts share one.
+
+    Args:
+        elements: Elements with an elasticity for each of nm materials.
+        plastic: Constants of ``materials.plasticity.plastic_constants`` of each material, shape (nm, 6).
+
+    Returns:
+        Elements and plastic constants, shape (nd, 6), of the nd distinct materials.
+    """
     constants = np.column_stack([elements.elasticity.reshape(len(plastic), -1), plastic])
     _, first, material = np.unique(constants, axis=0, return_index=True, return_inverse=True)
     material = material.reshape(-1)[elements.material].astype(np.int32)
@@ -97,7 +108,14 @@ def merge_equal_materials(elements: Elements, plastic: NDArray[np.float64]) -> t
 
 
 def gradient_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64], finite: bool) -> Blocks:
-    """Return blocks of stress-free tetrahedra; ``plastic (nm, 6)`` as in ``materials.plasticity``."""
+    """Return stress-free tetrahedra in blocks of sixteen, the arguments of the nonlinear kernels.
+
+    Args:
+        elements: Tetrahedra with 4 or 10 nodes.
+        lanes: Their order, from ``arrange``.
+        plastic: Constants of ``materials.plasticity.plastic_constants`` of each material, shape (nm, 6).
+        finite: Whether kinematics are finite (the state then holds stretches) instead of small.
+    """
     corners, kind = elements.points[elements.cells[lanes.shape]], elements.kind
     gradient, determinant = (TETRAHEDRON if kind.nodes == 4 else TEN_NODES).gradients(corners)
     weight = determinant / (6.0 * determinant.shape[1])
@@ -112,7 +130,14 @@ def gradient_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float6
 
 
 def one_point_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64], finite: bool) -> OnePointBlocks:
-    """Return blocks of stress-free one-point hexahedra; ``plastic (nm, 6)`` as in ``materials.plasticity``."""
+    """Return stress-free one-point hexahedra in blocks of sixteen, the arguments of the nonlinear kernels.
+
+    Args:
+        elements: Hexahedra of the one-point formulation.
+        lanes: Their order, from ``arrange``.
+        plastic: Constants of ``materials.plasticity.plastic_constants`` of each material, shape (nm, 6).
+        finite: Whether kinematics are finite (the state then holds stretches) instead of small.
+    """
     shapes = elements.subset(lanes.shape)
     volume = element_geometry(shapes.points, shapes.cells).volume
     return OnePointBlocks(
@@ -128,14 +153,15 @@ def one_point_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float
 
 
 def hexahedron_constants(shapes: Elements) -> NDArray[np.float64]:
-    """Return the constants of each shape for ``kernels.turned_hexahedron``.
+    """Return the constants of hexahedra of each shape for the kernels with one mean deformation and hourglass modes.
 
     Args:
-        shapes: One element of each shape.
+        shapes: One hexahedron of each shape, ns of them.
 
     Returns:
-        V C [J], b_p [1/m] for p = 1 to 7, c_k [m] and the hourglass stiffness H [N/m] in the amplitudes of the modes
-        xy, xz, yz, xyz, shape (ns, 120).
+        Shape (ns, 120): volume times the nine orthotropic constants [J]; mean gradients of the nodal modes of parity 1
+        to 7, 21 entries [1/m]; corner positions in the modes xy, xz, yz, xyz, 12 entries [m]; hourglass stiffness of
+        their amplitudes, 24 entries of the diagonal blocks and 54 of the others [N/m].
     """
     corners = shapes.points[shapes.cells]
     geometry = element_geometry(shapes.points, shapes.cells)
@@ -152,13 +178,26 @@ def hexahedron_constants(shapes: Elements) -> NDArray[np.float64]:
 
 
 def in_modes(amplitudes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return amplitudes ``(ne, 12)`` [m] in the modes xy, xz, yz, xyz from amplitudes in the modes of ``one_point``."""
+    """Convert hourglass amplitudes from the modes yz, xz, xy, xyz of ``one_point`` to the unscaled xy, xz, yz, xyz.
+
+    Args:
+        amplitudes: Amplitudes, mode by mode with three components each, shape (ne, 12) [m].
+
+    Returns:
+        Amplitudes in the same storage, shape (ne, 12) [m].
+    """
     ordered = amplitudes.reshape(-1, 4, 3)[:, AMPLITUDES] * HANDEDNESS[:, None]
     return np.sqrt(8.0) * ordered.reshape(amplitudes.shape)
 
 
 def hexahedron_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64]) -> HexahedronBlocks:
-    """Return blocks of stress-free, fully integrated hexahedra; ``plastic (nm, 6)`` as in ``materials.plasticity``."""
+    """Return stress-free, fully integrated hexahedra in blocks of sixteen, the arguments of the nonlinear kernels.
+
+    Args:
+        elements: Hexahedra with incompatible modes.
+        lanes: Their order, from ``arrange``.
+        plastic: Constants of ``materials.plasticity.plastic_constants`` of each material, shape (nm, 6).
+    """
     corners = elements.points[elements.cells[lanes.shape]]
     count = len(corners)
     weight = np.linalg.det(np.einsum("eai,gad->egid", corners, GAUSS_DERIVATIVES, optimize=True))
@@ -185,7 +224,8 @@ def gauss_volumes(position: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the volumes at the Gauss points ``(k, 8)`` of hexahedra, up to a common factor.
 
     Args:
-        position: Transformed positions, see ``kernels.nonlinear_hexahedron``, shape (k, 7, 3) [m].
+        position: Walsh-Hadamard transform of the corner positions, parities 1 to 7 (bit d: odd along direction d; order
+            x, y, xy, z, xz, yz, xyz), shape (k, 7, 3) [m].
     """
     corners = np.einsum("pa,kpi->kai", SIGNS[1:], position)
     return np.linalg.det(np.einsum("kai,gad->kgid", corners, GAUSS_DERIVATIVES, optimize=True))
@@ -216,10 +256,16 @@ def _orthonormal_basis(weight: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def elastic_constants(elasticity: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the nine constants of orthotropic materials ``(nm, 9)`` [Pa]; see ``kernels.nonlinear.elastic_stress``.
+    """Return the nine constants of orthotropic materials.
+
+    Args:
+        elasticity: Elasticity of each material, rows xx, yy, zz, xy, yz, xz, shape (nm, 6, 6) [Pa].
+
+    Returns:
+        C_xx, C_yy, C_zz, C_xy, C_yz, C_xz (normal), G_xy, G_yz, G_xz of each material, shape (nm, 9) [Pa].
 
     Raises:
-        ValueError: A material couples normal strain and shear.
+        ValueError: A material couples normal strain and shear, or two shears: its axes are not x, y, z.
     """
     rest = elasticity.copy()
     rest[:, ORTHOTROPIC[0], ORTHOTROPIC[1]] = rest[:, ORTHOTROPIC[1], ORTHOTROPIC[0]] = 0.0
@@ -229,7 +275,17 @@ def elastic_constants(elasticity: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def initial_state(blocks: int, points: int, finite: bool) -> NDArray[np.float64]:
-    """Return the stress-free state ``(nb, m, 16 * 13)`` of m points, with unit stretch for finite strains."""
+    """Return the stress-free state of elements in blocks of sixteen.
+
+    Args:
+        blocks: Number of blocks nb.
+        points: Number of integration points m of an element.
+        finite: Whether strains are finite; the stretches of the state are then the identity, otherwise 0 and not used.
+
+    Returns:
+        State, shape (nb, m, 208), entry k of element e at ``16 * k + e``: stress xx, yy, zz, xy, yz, xz [Pa],
+        equivalent plastic strain, stretch in the order of the stress.
+    """
     state = _written_zeros(blocks, points, STATE_SLOTS)
     state[:, :, STRETCH : STRETCH + 3 * LANES] = float(finite)
     return state

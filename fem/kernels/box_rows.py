@@ -86,7 +86,7 @@ def add_transform(faces, starts, count, line):
 
     Args:
         faces: Value of parity k at node i at ``faces[k, FIRST + i]``, shape (4, >= FIRST + count).
-        starts: Positions at which the four lines of the row begin, shape (4,).
+        starts: Positions at which the four lines of the row begin, second direction first, shape (4,).
         count: Number of nodes along the row.
         line: Component at all positions of the lines, shape (>= p,), added to.
     """
@@ -103,7 +103,9 @@ def add_transform(faces, starts, count, line):
 
 @njit(inline="always")
 def couple_inner(pair, k, count, faces, forces):
-    """Write the face forces of one parity at the inner nodes of a row: equations of the module.
+    """Write the face forces of one parity at the inner nodes of a row of equal boxes, from their stiffness blocks.
+
+    Component 0 is taken at parity k, component 1 at k XOR 1, component 2 at k XOR 2.
 
     Args:
         pair: Even and odd block E and O of the parity, entries 00 01 02 11 12 22, shape (2, 6) [N/m].
@@ -111,7 +113,8 @@ def couple_inner(pair, k, count, faces, forces):
         count: Number of boxes in the row.
         faces: Transformed displacements, component by parity by node (first node at column FIRST), shape (3, 4,
             COLUMNS) [m].
-        forces: Transformed forces in the same order [N]; nodes 1 to ``count - 1`` are written, up to whole vectors.
+        forces: Transformed forces in the same order, shape (3, 4, COLUMNS) [N]; nodes 1 to ``count - 1`` are written,
+            up to whole vectors.
     """
     e, o = pair[0], pair[1]
     x, y, z = faces[0, k, FIRST:], faces[1, k ^ 1, FIRST:], faces[2, k ^ 2, FIRST:]
@@ -132,11 +135,12 @@ def couple_ends(pair, k, count, faces, forces):
     """Write the face forces of one parity at the first and last node of a row, which belong to one box only.
 
     Args:
-        pair: As in ``couple_inner``.
-        k: As in ``couple_inner``.
-        count: As in ``couple_inner``.
-        faces: As in ``couple_inner``.
-        forces: Transformed forces, shape (3, 4, COLUMNS) [N]; nodes 0 and ``count`` are written.
+        pair: Even and odd block E and O of the parity, entries 00 01 02 11 12 22, shape (2, 6) [N/m].
+        k: Parity across the row, 0 to 3.
+        count: Number of boxes in the row.
+        faces: Transformed displacements, component by parity by node (first node at column FIRST), shape (3, 4,
+            COLUMNS) [m].
+        forces: Transformed forces in the same order, shape (3, 4, COLUMNS) [N]; nodes 0 and ``count`` are written.
     """
     e, o = pair[0], pair[1]
     x, y, z = faces[0, k], faces[1, k ^ 1], faces[2, k ^ 2]
@@ -159,9 +163,9 @@ def add_row_forces(rows, blocks, displacement, force):
             most ``LONGEST``), index into ``blocks``; shape (nr, 6) int32.
         blocks: Stiffness blocks of each shape and parity, entries 00 01 02 11 12 22, divided by 8, shape (ns, 8, 6)
             [N/m].
-        displacement: Displacement u at the positions, see ``read_lines``, shape (3, >= p + PAD) [m]; finite in the
+        displacement: Displacement u, component by position in the lines, shape (3, >= p + PAD) [m]; finite in the
             padding.
-        force: K u at the positions, shape (3, >= p + PAD) [N], added to.
+        force: K u, component by position in the lines, shape (3, >= p + PAD) [N], added to.
     """
     faces, forces = np.zeros((3, 4, COLUMNS)), np.zeros((3, 4, COLUMNS))
     for r in range(len(rows)):

@@ -17,7 +17,7 @@ def add_block_force(pointer, columns, blocks, displacement, force):
     Args:
         pointer: First block of each row, and the number of blocks, shape (n + 1,) int32.
         columns: Column (node) of each block, shape (nb,) int32.
-        blocks: Blocks of K, shape (nb, 3, 3) [N/m].
+        blocks: Upper blocks of K, diagonal ones halved, shape (nb, 3, 3) [N/m].
         displacement: Nodal displacement u, shape (>= n, 3) [m].
         force: Nodal force, shape (>= n, 3) [N], subtracted from.
     """
@@ -51,7 +51,7 @@ def assemble_upper_blocks(cells, stiffness, pointer, columns, blocks):
     Diagonal blocks are halved, as ``add_block_force`` expects.
 
     Args:
-        cells: Nodes of each element, shape (ne, k).
+        cells: Nodes of each element of k nodes, shape (ne, k).
         stiffness: Element stiffnesses, node by node, shape (ne, 3k, 3k) [N/m].
         pointer: First block of each row, and the number of blocks, shape (n + 1,).
         columns: Column (node) of each block, ascending in a row, shape (nb,); must contain all pairs of ``cells``.

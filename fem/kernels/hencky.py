@@ -61,9 +61,10 @@ def hencky(strain, law, stress, tangent):
 
     Args:
         strain: Strain xx, yy, zz, xy, yz, xz with engineering shear, shape (6,).
-        law: ``PointLaw``: elasticity (6, 6) [Pa] and plastic constants (6,).
-        stress: Written, shape (6,) [Pa].
-        tangent: Written, shape (6, 6) [Pa].
+        law: ``PointLaw``: elasticity (6, 6) [Pa] and plastic constants (6,): 3 G [Pa], A and B [Pa] and n of the yield
+            stress A + B p^n, rate constant C, reference rate [1/s]; A is infinite for an elastic material.
+        stress: Written: xx, yy, zz, xy, yz, xz, shape (6,) [Pa].
+        tangent: Written: derivative of the stress by the strain, shape (6, 6) [Pa].
 
     Returns:
         Equivalent plastic strain, 0 where the material is elastic.
@@ -100,9 +101,9 @@ def soften(deviator, across, along, tangent):
     """Subtract the softening by plastic flow from the tangent, for all deviators and along the current deviator.
 
     Args:
-        deviator: Elastic stress deviator, shape (6,) [Pa].
-        across: Reduction of 2 G for all deviators [Pa].
-        along: Additional reduction along the deviator, over its square [1/Pa].
+        deviator: Elastic stress deviator, xx, yy, zz, xy, yz, xz, shape (6,) [Pa].
+        across: Reduction of 2 G for all deviators, scalar [Pa].
+        along: Additional reduction along the deviator, over its square, scalar [1/Pa].
         tangent: Elastic tangent on entry, elastoplastic tangent on return, shape (6, 6) [Pa].
     """
     for i in range(6):
@@ -122,8 +123,9 @@ def add_points(shape, unknowns, law, state):
     Args:
         shape: ``Shape``: strain matrices (m, 6, k) [1/m] and weights (m,) [m^3] of the integration points.
         unknowns: Displacements of 24 nodal components, then of incompatible modes if any, shape (k,) [m].
-        law: ``PointLaw`` of the element.
-        state: ``ElementState`` of the element, overwritten: points (m, 7), force (k,) [N], tangent (k, k) [N/m].
+        law: ``PointLaw`` of the element: elasticity (6, 6) [Pa] and plastic constants (6,).
+        state: ``ElementState`` of the element, overwritten: stress [Pa] and equivalent plastic strain of the points
+            (m, 7), force (k,) [N], tangent (k, k) [N/m].
 
     Returns:
         Largest sum of magnitudes of the force contributions to an incompatible mode [N], the scale of its residual.
@@ -162,11 +164,12 @@ def relax_modes(shape, unknowns, law, state):
         shape: ``Shape`` of the element: strain matrices (8, 6, 33) [1/m], weights (8,) [m^3].
         unknowns: Nodal displacements (24 entries, fixed), then the modes (9 entries, start values replaced by the
             solution), shape (33,) [m].
-        law: ``PointLaw`` of the element.
-        state: ``ElementState`` of the element, overwritten: points (8, 7), force (33,) [N], tangent (33, 33) [N/m].
+        law: ``PointLaw`` of the element: elasticity (6, 6) [Pa] and plastic constants (6,).
+        state: ``ElementState`` of the element, overwritten: stress [Pa] and equivalent plastic strain of the points
+            (8, 7), force (33,) [N], tangent (33, 33) [N/m].
 
     Returns:
-        Whether the iteration converged.
+        Whether the force on the modes fell below 1e-12 of its contributions within 60 iterations.
     """
     scale, step, start = add_points(shape, unknowns, law, state), np.empty(ALL - NODAL), np.empty(ALL - NODAL)
     rest, modes = state.force[NODAL:], unknowns[NODAL:]
@@ -200,7 +203,7 @@ def largest_of(values):
 
 @njit(cache=True)
 def product(left, right):
-    """Return the scalar product of two vectors of shape (k,)."""
+    """Return the scalar product of two vectors, each of shape (k,)."""
     total = 0.0
     for k in range(len(left)):
         total += left[k] * right[k]
@@ -212,7 +215,7 @@ def solve(matrix, right):
     """Solve a symmetric positive definite linear system in place by Gaussian elimination.
 
     Args:
-        matrix: Shape (k, k), overwritten by its upper triangular factor.
+        matrix: Matrix of the system, shape (k, k), overwritten by its upper triangular factor.
         right: Right-hand side on entry, solution on return, shape (k,).
     """
     size = len(right)
@@ -235,7 +238,7 @@ def hexahedra(corners, displacement, materials, states):
     Args:
         corners: Node positions in tensor order, shape (ne, 8, 3) [m].
         displacement: Displacement node by node, less free expansion, shape (ne, 24) [m].
-        materials: Elasticities (nm, 6, 6) [Pa], plastic constants (nm, 6), index of each element's material (ne,).
+        materials: Tuple: elasticities (nm, 6, 6) [Pa], plastic constants (nm, 6), material index of each element (ne,).
         states: ``ElementState``, written: stress [Pa] and plastic strain at the Gauss points (ne, 8, 7), internal force
             (ne, 24) [N], tangent (ne, 24, 24) [N/m] with the modes condensed.
 
@@ -266,7 +269,7 @@ def one_point(shape, displacement, materials, states):
     Args:
         shape: ``Shape`` of all elements: mean strain matrices (ne, 1, 6, 24) [1/m], volumes (ne, 1) [m^3].
         displacement: Displacement node by node, less free expansion, shape (ne, 24) [m].
-        materials: Elasticities (nm, 6, 6) [Pa], plastic constants (nm, 6), index of each element's material (ne,).
+        materials: Tuple: elasticities (nm, 6, 6) [Pa], plastic constants (nm, 6), material index of each element (ne,).
         states: ``ElementState``, written: stress [Pa] and plastic strain (ne, 1, 7), internal force (ne, 24) [N],
             tangent (ne, 24, 24) [N/m].
     """
@@ -279,13 +282,13 @@ def one_point(shape, displacement, materials, states):
 
 @njit(cache=True, error_model="numpy")
 def hourglass_share(points, stress, laws, share):
-    """Compute the fraction of elastic hourglass forces that yielding sections carry, see ``nonlinear_one_point``.
+    """Compute the fraction of the elastic hourglass forces that one-point hexahedra carry when their sections yield.
 
     Args:
-        points: Stress [Pa] and plastic strain at the centres, shape (ne, 1, 7).
-        stress: Elastic hourglass stress, shape (ne,) [Pa].
+        points: Stress xx, yy, zz, xy, yz, xz [Pa] and equivalent plastic strain at the centres, shape (ne, 1, 7).
+        stress: Magnitude of the elastic hourglass stress, shape (ne,) [Pa].
         laws: Plastic constants of each element, shape (ne, 6), see ``materials.plasticity.plastic_constants``.
-        share: Written: fraction between 0 and 1, shape (ne,).
+        share: Written: fraction between 0 and 1, shape (ne,); 1 where the section is elastic.
     """
     for e in range(len(stress)):
         s = points[e, 0]

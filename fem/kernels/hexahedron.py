@@ -35,7 +35,7 @@ GAUSS_VALUES = 0.125 * np.prod(1.0 + GAUSS[:, None, :] * SIDES, axis=2)
 
 @njit(cache=True, fastmath=FINITE)
 def add_product(left, right, scale, result):
-    """Add ``scale * left @ right`` to ``result``: matrices (m, k), (k, n) and (m, n), scale a scalar."""
+    """Add ``scale * left @ right`` to ``result``; shapes (m, k), (k, n) and (m, n), ``scale`` a scalar."""
     for i in range(left.shape[0]):
         for k in range(left.shape[1]):
             factor = scale * left[i, k]
@@ -76,8 +76,8 @@ def write_strain_columns(strain, column, gx, gy, gz):
         strain: Strain matrix, rows xx, yy, zz, xy, yz, xz (engineering shear), shape (6, k) [1/m].
         column: First of the columns, for the component along x.
         gx: Derivative of the function along x, scalar [1/m].
-        gy: Derivative along y.
-        gz: Derivative along z.
+        gy: Derivative along y, scalar [1/m].
+        gz: Derivative along z, scalar [1/m].
     """
     strain[:, column : column + 3] = 0.0
     strain[0, column] = gx
@@ -93,9 +93,12 @@ def write_strain_columns(strain, column, gx, gy, gz):
 
 @njit(cache=True)
 def condense(full, kept):
-    """Condense a symmetric matrix of shape (n, n) to its first ``kept`` unknowns in place (Gaussian elimination).
+    """Condense a symmetric matrix to its first unknowns in place (Schur complement by Gaussian elimination).
 
-    The upper left block of shape (kept, kept) is the result; the other entries are left undefined.
+    Args:
+        full: Matrix, shape (n, n); on return its upper left block of shape (kept, kept) is the result, the other
+            entries are undefined.
+        kept: Number of unknowns that remain, scalar.
     """
     for pivot in range(full.shape[0] - 1, kept - 1, -1):
         for i in range(pivot):
@@ -109,7 +112,7 @@ def orthonormal_linear(weights, basis):
     """Orthonormalise the functions 1, xi, eta, zeta at the eight Gauss points by Gram-Schmidt.
 
     Args:
-        weights: Weights of the Gauss points in the scalar product, shape (8,).
+        weights: Weights of the Gauss points in the scalar product, shape (8,) [m^3].
         basis: Written: values of the four functions at the Gauss points, shape (4, 8).
     """
     for k in range(4):
@@ -231,7 +234,7 @@ def stiffness(points, elasticity, material, result):
 
 @njit(cache=True)
 def copy_square(source, result):
-    """Copy the upper left part of ``source`` into ``result (n, n)``.
+    """Copy the upper left n x n part of ``source``, shape (>= n, >= n), into ``result``, shape (n, n).
 
     As a slice assignment, Numba would need seconds to compile the message of the error for wrong shapes.
     """

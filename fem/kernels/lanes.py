@@ -37,7 +37,13 @@ def nine(values, at):
 
 @njit(**LANE_OPTIONS)
 def put_nine(values, at, m):
-    """Write the 3 x 3 matrix ``m`` of one element, nine scalars row by row, to ``values[at + 16 * k]``."""
+    """Write the 3 x 3 matrix of one element among sixteen.
+
+    Args:
+        values: Flat array of sixteen elements; entry k of the matrix is written to ``values[at + 16 * k]``.
+        at: Position of its first entry, a multiple of 16 plus the number of the element (0 to 15).
+        m: Matrix, nine scalars row by row.
+    """
     values[at], values[at + LANES], values[at + 2 * LANES] = m[0], m[1], m[2]
     values[at + 3 * LANES], values[at + 4 * LANES], values[at + 5 * LANES] = m[3], m[4], m[5]
     values[at + 6 * LANES], values[at + 7 * LANES], values[at + 8 * LANES] = m[6], m[7], m[8]
@@ -63,14 +69,26 @@ def six(values, at):
 
 @njit(**LANE_OPTIONS)
 def put_six(values, at, m):
-    """Write the symmetric matrix ``m``, six scalars, of one element to ``values[at + 16 * k]``; as ``six`` reads."""
+    """Write the symmetric 3 x 3 matrix of one element among sixteen.
+
+    Args:
+        values: Flat array of sixteen elements; entry k of the matrix is written to ``values[at + 16 * k]``.
+        at: Position of its first entry, a multiple of 16 plus the number of the element (0 to 15).
+        m: Matrix, six scalars: xx, yy, zz, xy, yz, xz.
+    """
     values[at], values[at + LANES], values[at + 2 * LANES] = m[0], m[1], m[2]
     values[at + 3 * LANES], values[at + 4 * LANES], values[at + 5 * LANES] = m[3], m[4], m[5]
 
 
 @njit(**LANE_OPTIONS)
 def six_of(values, g, at):
-    """Return six scalars of one element, ``values[g, at + 16 * k]`` for k = 0 to 5; row ``g`` of a 2D array."""
+    """Return the symmetric 3 x 3 matrix of one element at one integration point as six scalars: xx, yy, zz, xy, yz, xz.
+
+    Args:
+        values: One row per integration point, shape (m, >= at + 81); entry k is ``values[g, at + 16 * k]``.
+        g: Row, number of the integration point.
+        at: Column of the first entry, a multiple of 16 plus the number of the element (0 to 15).
+    """
     return (
         values[g, at],
         values[g, at + LANES],
@@ -83,26 +101,44 @@ def six_of(values, g, at):
 
 @njit(**LANE_OPTIONS)
 def put_six_of(values, g, at, m):
-    """Write six scalars ``m`` of one element to ``values[g, at + 16 * k]``; ``put_six`` for row ``g`` of a 2D array."""
+    """Write the symmetric 3 x 3 matrix of one element at one integration point.
+
+    Args:
+        values: One row per integration point, shape (m, >= at + 81); entry k is written to ``values[g, at + 16 * k]``.
+        g: Row, number of the integration point.
+        at: Column of the first entry, a multiple of 16 plus the number of the element (0 to 15).
+        m: Matrix, six scalars: xx, yy, zz, xy, yz, xz.
+    """
     values[g, at], values[g, at + LANES], values[g, at + 2 * LANES] = m[0], m[1], m[2]
     values[g, at + 3 * LANES], values[g, at + 4 * LANES], values[g, at + 5 * LANES] = m[3], m[4], m[5]
 
 
 @njit(**LANE_OPTIONS)
 def three(values, at):
-    """Return three scalars of one element, ``values[at + 16 * k]`` for k = 0 to 2; ``at`` as in ``nine``."""
+    """Return a vector of one element among sixteen as three scalars.
+
+    Args:
+        values: Flat array of sixteen elements; component k of the vector is ``values[at + 16 * k]``.
+        at: Position of its first component, a multiple of 16 plus the number of the element (0 to 15).
+    """
     return values[at], values[at + LANES], values[at + 2 * LANES]
 
 
 @njit(**LANE_OPTIONS)
 def put_three(values, at, v):
-    """Write the vector ``v``, three scalars, of one element to ``values[at + 16 * k]``; as ``three`` reads."""
+    """Write a vector of one element among sixteen.
+
+    Args:
+        values: Flat array of sixteen elements; component k of the vector is written to ``values[at + 16 * k]``.
+        at: Position of its first component, a multiple of 16 plus the number of the element (0 to 15).
+        v: Vector, three scalars.
+    """
     values[at], values[at + LANES], values[at + 2 * LANES] = v[0], v[1], v[2]
 
 
 @njit(**LANE_OPTIONS)
 def cross(a, b):
-    """Return the cross product a x b of two vectors as three scalars."""
+    """Return the cross product a x b of two vectors; all three are three scalars."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
@@ -118,13 +154,13 @@ def applied(m, v):
 
 @njit(**LANE_OPTIONS)
 def full(m):
-    """Return a symmetric matrix, given as xx, yy, zz, xy, yz, xz, as nine scalars row by row."""
+    """Return a symmetric 3 x 3 matrix, given as six scalars xx, yy, zz, xy, yz, xz, as nine scalars row by row."""
     return m[0], m[3], m[5], m[3], m[1], m[4], m[5], m[4], m[2]
 
 
 @njit(**LANE_OPTIONS)
 def times(m, n):
-    """Return the matrix product m n of two 3 x 3 matrices, each nine scalars row by row."""
+    """Return the matrix product m n of two 3 x 3 matrices; all three are nine scalars, row by row."""
     return (
         m[0] * n[0] + m[1] * n[3] + m[2] * n[6],
         m[0] * n[1] + m[1] * n[4] + m[2] * n[7],
@@ -140,13 +176,13 @@ def times(m, n):
 
 @njit(**LANE_OPTIONS)
 def transposed(m):
-    """Return the transpose of a 3 x 3 matrix of nine scalars, row by row."""
+    """Return the transpose of a 3 x 3 matrix; both are nine scalars, row by row."""
     return m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8]
 
 
 @njit(**LANE_OPTIONS)
 def scaled(factor, m):
-    """Return a scalar factor times a 3 x 3 matrix of nine scalars."""
+    """Return a scalar factor times a 3 x 3 matrix; both matrices are nine scalars, row by row."""
     return (
         factor * m[0],
         factor * m[1],
@@ -178,7 +214,7 @@ def cofactor(m):
 
 @njit(**LANE_OPTIONS)
 def cofactor_symmetric(m):
-    """Return the cofactor matrix of a symmetric matrix; both are six scalars: xx, yy, zz, xy, yz, xz."""
+    """Return the cofactor matrix of a symmetric 3 x 3 matrix; both are six scalars: xx, yy, zz, xy, yz, xz."""
     return (
         m[1] * m[2] - m[4] * m[4],
         m[0] * m[2] - m[5] * m[5],
@@ -191,7 +227,7 @@ def cofactor_symmetric(m):
 
 @njit(**LANE_OPTIONS)
 def determinant(m, cofactors):
-    """Return the determinant of a 3 x 3 matrix, given its nine entries and its cofactors from ``cofactor``."""
+    """Return the determinant of a 3 x 3 matrix from its entries and cofactors, nine scalars row by row each."""
     return m[0] * cofactors[0] + m[1] * cofactors[1] + m[2] * cofactors[2]
 
 
@@ -200,7 +236,7 @@ def gather_lanes(cells, values, result):
     """Copy nodal vectors of sixteen elements with k nodes into a flat array.
 
     Args:
-        cells: Nodes of the elements, shape (k, 16).
+        cells: Nodes of the elements, local node by element, shape (k, 16).
         values: Nodal vectors, such as displacements [m], shape (n, 3).
         result: Written: component c at node a of element e at ``16 * (3 a + c) + e``, shape (>= 48 k,).
     """
@@ -213,12 +249,13 @@ def gather_lanes(cells, values, result):
 
 @njit(cache=True)
 def scatter_lanes(cells, count, source, values):
-    """Subtract nodal vectors of elements from the rows of an array over all nodes.
+    """Subtract nodal vectors of sixteen elements with k nodes from an array over all nodes.
 
     Args:
-        cells: Nodes of the sixteen elements, shape (k, 16).
-        count: Number of leading elements that count; the others repeat the last of them.
-        source: Vectors of the elements, such as forces [N], in the order of ``gather_lanes``, shape (>= 48 k,).
+        cells: Nodes of the elements, local node by element, shape (k, 16).
+        count: Number of leading elements that are subtracted; the others repeat the last of them.
+        source: Vectors of the elements, such as forces [N]: component c at local node a of element e at
+            ``16 * (3 a + c) + e``, shape (>= 48 k,).
         values: Nodal vectors, shape (n, 3), subtracted from.
     """
     for a in range(len(cells)):
@@ -246,7 +283,12 @@ def turn(rotation, vectors):
 
 @njit(**LANE_OPTIONS)
 def turn_back(rotation, vectors):
-    """Rotate vectors of sixteen elements in place by the transpose: v becomes R^T v; arguments as in ``turn``."""
+    """Rotate vectors of sixteen elements in place by the transpose: v becomes R^T v.
+
+    Args:
+        rotation: One matrix R per element, entry k of element e at ``16 * k + e``, row by row, shape (144,).
+        vectors: m vectors per element, component c of vector i at ``16 * (3 i + c) + e``, shape (48 m,).
+    """
     for start in range(0, len(vectors), 3 * LANES):
         v = vectors[start : start + 3 * LANES]
         for lane in range(LANES):
@@ -258,9 +300,9 @@ def add_elastic(s, d, c):
     """Return the stress s + C d of one point as six scalars: xx, yy, zz, xy, yz, xz.
 
     Args:
-        s: Stress, six scalars [Pa].
-        d: Strain increment, six scalars, with engineering shear.
-        c: Orthotropic elasticity, nine scalars [Pa] in the order of ``kernels.nonlinear.elastic_stress``.
+        s: Stress, six scalars in the same order [Pa].
+        d: Strain increment, six scalars in the same order, with engineering shear.
+        c: Orthotropic elasticity, nine scalars [Pa]: C_xx, C_yy, C_zz, C_xy, C_yz, C_xz (normal), G_xy, G_yz, G_xz.
     """
     return (
         s[0] + c[0] * d[0] + c[3] * d[1] + c[5] * d[2],
