@@ -130,7 +130,7 @@ def check_elements(name: str) -> None:
 
 
 def count_elements(volumes: Iterable[int]) -> int:
-    """Return the number of three-dimensional elements in volumes of the current, meshed Gmsh model, given by their tags."""
+    """Return the number of 3D elements in volumes of the current, meshed Gmsh model, given by their tags."""
     return sum(len(tags) for volume in volumes for tags in gmsh.model.mesh.getElements(3, volume)[1])
 
 
