@@ -212,11 +212,23 @@ class HeldVelocityMeso(VelocityFollower):
 
 
 def local_interface(body: Body) -> NDArray[np.int32]:
-    """Return the local numbers of the interface nodes on this rank, shape (k,)."""
+    """Return the local numbers of the interface nodes on this rank, shape (k,).
+
+    Interface nodes are shared by macro and meso model; the order is the same in both.
+
+    Args:
+        body: Model on this rank.
+    """
     return body.interface[body.interface >= 0]
 
 
 def counted_interface(body: Body) -> NDArray[np.int32]:
-    """Return the local numbers of the interface nodes that this rank owns, shape (k,), each on one rank only."""
+    """Return the local numbers of the interface nodes that this rank owns, shape (k,), each on one rank only.
+
+    Interface nodes are shared by macro and meso model.
+
+    Args:
+        body: Model on this rank.
+    """
     nodes = local_interface(body)
     return nodes[body.shared.owned[nodes]]

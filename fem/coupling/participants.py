@@ -34,10 +34,13 @@ def couple(
 
     Args:
         comms: Communicators of both models.
-        bodies: Models of this rank.
+        bodies: Models of this rank, ``macro``, ``meso`` or both.
         loads: Loads and damping of each model.
-        plan: Windows and substeps.
+        plan: Windows (times between two exchanges of the models) and substeps.
         scheme: Coupling scheme.
+
+    Returns:
+        Models of this rank with their motion, in the order of their turns, clocks of the channels, and the self-check.
 
     Raises:
         AgreedError: The self-check failed; on every rank.

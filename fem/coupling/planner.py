@@ -89,7 +89,12 @@ class Measured:
 
 
 def works_of(divided: DividedModels[Tables], request: RunInput | StructureInput) -> dict[Role, ModelWork]:
-    """Return the work of each model of a divided mesh."""
+    """Return the work of each model of a divided mesh: its mesh, steps of each cell in a window, and kind of elements.
+
+    Args:
+        divided: Models before distribution, with their meshes on rank 0.
+        request: Input of the run, with materials, formulation and kinematics.
+    """
     works: dict[Role, ModelWork] = {}
     for role, tables in divided.tables.items():
         _, assigned = materials_of_parts(tables.part_names, request.part_materials)
@@ -117,9 +122,12 @@ def plan_ranks(
         world: Communicator of all ranks.
         loads: Work of each model.
         ranks: Placement settings of the input.
-        folder: Checkpoint folder, which also stores the measurement, so that a restart has the same cells on the same
-            ranks and identical results.
-        scheme: Coupling scheme.
+        folder: Checkpoint folder. The measurement is read from it and written to it, so that a restart has the same
+            cells on the same ranks and identical results. None measures without storing.
+        scheme: Coupling scheme, which decides whether both models can work concurrently.
+
+    Returns:
+        Ranks of each model, rank of each cell (on rank 0 only), and the summary for the result file.
     """
     family = {role: families(load.mesh, load.kind) for role, load in loads.items() if load.mesh}
     present = np.unique(np.concatenate([np.zeros(0, np.int8), *family.values()]))
@@ -147,7 +155,17 @@ def _measure(world: MPI.Comm, loads: Mapping[Role, ModelWork], family: Mapping[R
 
 
 def stored_costs(world: MPI.Comm, folder: Path | None, present: NDArray[np.int8]) -> Measured | None:
-    """Return the stored costs if they cover this number of ranks and the element families present; collective."""
+    """Return the stored costs of element families and messages, equal on all ranks; collective.
+
+    Args:
+        world: Communicator of all ranks.
+        folder: Folder of the file, read on rank 0; may be None.
+        present: Element families in the meshes, indices into ``FAMILIES``, shape (k,).
+
+    Returns:
+        Costs; None if there is no folder or file, if the file is damaged (with a warning), or if it does not cover this
+        number of ranks and these families.
+    """
     costs = None
     if world.rank == 0 and folder is not None and (folder / COST_FILE).exists():
         try:
@@ -166,7 +184,12 @@ def _read(path: Path, ranks: int, present: NDArray[np.int8]) -> Measured | None:
 
 
 def store_costs(folder: Path, measured: Measured) -> None:
-    """Write measured costs for a restart."""
+    """Write measured costs as a JSON file for a restart; not collective.
+
+    Args:
+        folder: Checkpoint folder, created if missing.
+        measured: Fixed time and time per element of each family on each rank, and the time of a message [s].
+    """
     folder.mkdir(parents=True, exist_ok=True)
     cost = {"fixed": measured.cost.fixed.tolist(), "element": measured.cost.element.tolist()}
     write_atomically(folder / COST_FILE, json.dumps(cost | {"latency": measured.latency}).encode())
@@ -179,14 +202,17 @@ def plan_from(
     measured: Measured,
     overlap: bool,
 ) -> Plan:
-    """Choose the placement and the rank of each cell from measured costs.
+    """Choose the placement and the rank of each cell from measured costs; not collective.
 
     Args:
-        loads: Work of each model.
-        family: Element family of each cell of each model, shape (ne,).
+        loads: Work of each model, with meshes.
+        family: Index into ``FAMILIES`` of each cell of each model, shape (ne,).
         ranks: Placement settings of the input.
         measured: Measured costs of this machine.
         overlap: Whether both models work concurrently.
+
+    Returns:
+        Ranks of each model, rank of each cell of models on several ranks, and the summary for the result file.
     """
     cost, size = measured.cost, len(measured.cost.fixed)
     seconds = {role: _rank_seconds(load, family[role], cost) for role, load in loads.items()}
@@ -233,7 +259,19 @@ def _level_work(load: ModelWork, family: NDArray[np.int8], cost: StepCost) -> ND
 def summary(
     ranks: Ranks, placements: list[Alternative], speeds: NDArray[np.float64], measured: Measured
 ) -> dict[str, Any]:
-    """Return the chosen placement with predictions and measurements."""
+    """Return the chosen placement with predictions and measurements, for ``result.json``.
+
+    Args:
+        ranks: Placement settings of the input.
+        placements: Admissible placements with the predicted time of a window [s], the fastest first; it is chosen.
+        speeds: Relative speed of each rank, shape (ranks,).
+        measured: Measured costs.
+
+    Returns:
+        ``asked`` and ``chosen`` (names of placements), ``predicted_window_seconds``, ``alternatives`` (name ->
+        predicted time of a window [s]), ``speeds`` (list), ``update_seconds`` (element family -> mean time per
+        element [s]) and ``message_seconds`` (time of one message).
+    """
     mean = measured.cost.element.mean(axis=0)
     return {
         "asked": ranks.placement,
@@ -247,7 +285,11 @@ def summary(
 
 
 def words(plan: Plan) -> str:
-    """Return the placement and its predicted window time as one line of text."""
+    """Return the placement and its predicted window time [ms], with those of the alternatives, as one line of text.
+
+    Args:
+        plan: Assignment whose ``summary`` has the keys of the function ``summary``.
+    """
     others = [
         f"{name} {1e3 * seconds:.3g} ms"
         for name, seconds in plan.summary["alternatives"].items()

@@ -53,8 +53,13 @@ class LocalSteps:
 def scheme_of(name: SchemeName, direction: Direction = "two_way") -> Scheme:
     """Return the coupling scheme, as an object that creates the participants, of a name and direction.
 
+    Args:
+        name: ``held_velocity``, ``impulse``, ``local_steps`` or ``gravouil_combescure``.
+        direction: ``two_way``, or ``one_way`` without feedback from meso to macro model; then ``impulse`` is replaced
+            by the one-way scheme of held velocity.
+
     Raises:
-        ValueError: The scheme does not support one-way coupling.
+        ValueError: ``gravouil_combescure`` with ``one_way``.
     """
     if name == "gravouil_combescure":
         if direction == "one_way":

@@ -66,17 +66,30 @@ class SelfCheck:
 
 
 def recorded(checked: SelfCheck | None) -> dict[str, Any]:
-    """Return the self-check as a section of ``result.json``; empty for None, which is a run with one model."""
+    """Return the self-check as a section of ``result.json``.
+
+    Args:
+        checked: Result of the self-check, None for a run with one model.
+
+    Returns:
+        ``{"self_check": {...}}`` with the attributes of ``SelfCheck`` as keys; an empty dictionary for None.
+    """
     return {"self_check": asdict(checked)} if checked else {}
 
 
 def self_check(world: MPI.Comm, bodies: Mapping[Role, Body], channels: InterfaceChannels) -> SelfCheck:
-    """Check fields, forces and masses through ties and interface of two models; collective over ``world``.
+    """Measure the errors of fields, forces and masses at ties and interface of two models; collective over ``world``.
+
+    The limits of these errors are checked by ``SelfCheck.judge``.
 
     Args:
         world: Communicator of all ranks.
         bodies: Models of this rank, ``macro``, ``meso`` or both.
         channels: Open channels between both models.
+
+    Returns:
+        Relative errors of a rigid motion, a linear field and net forces, and the masses of both models [kg]; equal on
+        all ranks.
     """
     size = max(float(np.ptp(body.local.points, axis=0).max()) for body in bodies.values())
     size = world.allreduce(size, MPI.MAX)

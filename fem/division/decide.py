@@ -103,7 +103,7 @@ def in_two_steps(scheme: SchemeName, macro: NDArray[np.bool_], meso: NDArray[np.
         plan: Windows (coupling intervals, the steps of the macro model) and substeps (meso steps in a window).
 
     Returns:
-        Division in which all cells have step level 0.
+        Division with step level 1 for meso cells and 0 for all others.
     """
     return Division(scheme, macro, meso, meso.astype(np.int32), (plan.substeps,), plan)
 

@@ -30,10 +30,15 @@ RANK = 1e-9  # relative singular value below which a rigid-body motion is uncons
 
 
 def run_cooling(world: MPI.Comm, request: CoolingInput) -> None:
-    """Cool the undivided model and write displacement, stress and result; collective over ``world``.
+    """Cool the undivided model and write its residual stress; collective over ``world``.
 
-    Only symmetry planes and statically determinate pins, which have no reaction, support the board while it cools. The
+    The output folder receives ``cooling.npz`` (displacement and stress), ``residual.vtu`` and ``result.json``. Only
+    symmetry planes and statically determinate pins, which have no reaction, support the board while it cools. The
     supports of the drop test then fix it in its deformed shape.
+
+    Args:
+        world: Communicator of all ranks.
+        request: Input with meshes, materials, temperatures and output folder.
 
     Raises:
         AgreedError: The input or a mesh does not fit, or equilibrium is not reached; on every rank.
@@ -79,7 +84,13 @@ def _read_pinned_package(request: CoolingInput) -> PinnedPackage:
 
 
 def add_pins(item: ModelInput[JointTables]) -> ModelInput[JointTables]:
-    """Return a model with pins against every unconstrained rigid-body motion."""
+    """Return a model with pins (fixed displacement components) against every unconstrained rigid-body motion.
+
+    The pins are statically determinate, so that a load in equilibrium has no reaction at them.
+
+    Args:
+        item: Mesh and tables of one model before distribution; its mesh is unchanged.
+    """
     tables = item.tables
     held, usable = np.zeros((tables.nodes, 3), dtype=bool), np.zeros(tables.nodes, dtype=bool)
     held[tables.held_nodes] = tables.held
@@ -135,11 +146,12 @@ def choose_pins(
 
     Args:
         points: Nodes, shape (n, 3) [m].
-        held: Components that are already fixed, shape (n, 3).
-        usable: Nodes that may be pinned, shape (n,).
+        held: Whether each component is already fixed, shape (n, 3).
+        usable: Whether each node may be pinned, shape (n,).
 
     Returns:
-        Node and component of each pin, one per unconstrained rigid-body motion.
+        Node and component (0, 1, 2 for x, y, z) of each pin, shape (k,) each, with one pin for each unconstrained
+        rigid-body motion; empty if there is none.
     """
     motions = rigid_motions(points)
     _, values, right = np.linalg.svd(motions[held], full_matrices=True)
@@ -151,7 +163,9 @@ def choose_pins(
 
 
 def rigid_motions(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return translations along and rotations about x, y, z, shape (n, 3, 6), with lengths in units of the body's size.
+    """Return translations along and rotations about x, y, z as nodal displacements, shape (n, 3, 6).
+
+    The last axis has the three translations first. Lengths are in units of the body's size, so that all are alike.
 
     Args:
         points: Nodes, shape (n, 3) [m].

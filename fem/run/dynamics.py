@@ -85,12 +85,17 @@ class DynamicProblem(Protocol):
 
 
 def run_dynamics(world: MPI.Comm, problem: DynamicProblem) -> None:
-    """Run a problem and write its results; collective over ``world``.
+    """Run a problem in time and write its results to its output folder; collective over ``world``.
+
+    Args:
+        world: Communicator of all ranks.
+        problem: Package drop or structure, read and divided.
 
     Raises:
         AgreedError: The input or a mesh does not fit; on every rank.
         RankError: The number of ranks does not suit the problem; on every rank.
         EnergyError: The energy balance is violated; on every rank.
+        InvertedElementError: An element is inverted; only on the rank that has it.
     """
     start = time.perf_counter()
     plan = problem.place(world)
@@ -123,13 +128,32 @@ def run_dynamics(world: MPI.Comm, problem: DynamicProblem) -> None:
 
 
 def place_models(world: MPI.Comm, divided: DividedModels[Any], request: RunInput | StructureInput) -> Plan:
-    """Assign the divided models and their cells to ranks, and print the assignment; collective."""
+    """Assign the divided models and their cells to ranks, and print the assignment; collective.
+
+    Args:
+        world: Communicator of all ranks.
+        divided: Meshes (on rank 0) and tables of the models.
+        request: Input, with ranks, placement and checkpoint folder, in which measured costs are stored.
+
+    Returns:
+        Ranks of each model, rank of each cell (on rank 0), and the prediction for the result file.
+    """
     works, ranks = works_of(divided, request), request.ranks(world.size)
     return plan_ranks(world, works, ranks, request.checkpoints, divided.scheme)
 
 
 def make_participants(comms: Communicators, problem: DynamicProblem, models: Models, steps: Steps) -> CoupledRun:
-    """Create the participants (models with loads, motion and coupling) of this rank at time zero; collective."""
+    """Create the participants (models with loads, motion and coupling) of this rank at time zero; collective.
+
+    Args:
+        comms: Communicators of the run and of its models.
+        problem: Package drop or structure, which builds the loads.
+        models: Models of this rank.
+        steps: Time steps of the run.
+
+    Returns:
+        Participants in the order of their turns, clocks of their channels, and the self-check (None for one model).
+    """
     bodies = {role: model.body for role, model in models.items()}
     loads = {role: problem.loads(comms.models[role], model, steps) for role, model in models.items()}
     if problem.divided and problem.request.coupled:
@@ -176,7 +200,14 @@ def _make_outputs(comms: Communicators, problem: DynamicProblem, models: Models,
 
 
 def make_history(world: MPI.Comm, problem: DynamicProblem, models: Models, steps: Steps) -> History:
-    """Return an empty history with the watch points of this rank and the limit of the energy balance."""
+    """Return an empty history with the watch points of this rank and the limit of the energy balance.
+
+    Args:
+        world: Communicator of all ranks.
+        problem: Package drop or structure, with watch points and functions of time to record.
+        models: Models of this rank.
+        steps: Time steps of the run.
+    """
     limit, trivial = problem.request.numerics.energy_balance_limit, problem.trivial_energy(steps)
     balance = EnergyBalance(limit, trivial, steps.plan.step, steps.smallest)
     watches = {role: problem.watch(model) for role, model in models.items()}

@@ -126,7 +126,17 @@ class PackageDrop:
 
 
 def run_package(world: MPI.Comm, request: RunInput) -> None:
-    """Run one shock and write its results; collective over ``world``; raises as ``run_dynamics``."""
+    """Run one shock of a package on a board and write its results; collective over ``world``.
+
+    Args:
+        world: Communicator of all ranks.
+        request: Input with meshes, materials, shock and output folder.
+
+    Raises:
+        AgreedError: The input or a mesh does not fit; on every rank.
+        RankError: The number of ranks does not suit the problem; on every rank.
+        EnergyError: The energy balance is violated; on every rank.
+    """
     run_dynamics(world, PackageDrop.read(world, request))
 
 

@@ -28,6 +28,12 @@ RUNS: dict[type, Callable[[MPI.Comm, Any], None]] = {
 def main(world: MPI.Comm, arguments: list[str]) -> int:
     """Run the JSON input file named by the only argument; collective over ``world``.
 
+    Errors are printed by rank 0. An inverted element or an unexpected exception ends the MPI job on all ranks.
+
+    Args:
+        world: Communicator of all ranks.
+        arguments: Command-line arguments without the program, which are one path.
+
     Returns:
         Exit code, 0 for success and 1 for an error.
     """

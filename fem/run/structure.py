@@ -97,5 +97,15 @@ class StructureDynamics:
 
 
 def run_structure(world: MPI.Comm, request: StructureInput) -> None:
-    """Run one solver on a structure and write its results; collective over ``world``; raises as ``run_dynamics``."""
+    """Run the explicit or implicit solver on a structure and write its results; collective over ``world``.
+
+    Args:
+        world: Communicator of all ranks.
+        request: Input with mesh, materials, loads, dynamics and output folder.
+
+    Raises:
+        AgreedError: The input or a mesh does not fit; on every rank.
+        RankError: The number of ranks does not suit the problem; on every rank.
+        EnergyError: The energy balance is violated; on every rank.
+    """
     run_dynamics(world, StructureDynamics.read(world, request))

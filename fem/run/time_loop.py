@@ -80,11 +80,21 @@ def run_time_loop(
 ) -> tuple[int, float]:
     """Run the windows from the start or the latest checkpoint until the run is over; collective.
 
+    A window is the time between two exchanges of macro and meso model, or a step of a single model. The run ends after
+    the last window of the plan, or earlier if ``is_over`` returns true after a sample.
+
+    Args:
+        world: Communicator of all ranks.
+        participants: Models of this rank with their motion, in the order of their turns.
+        outputs: History, field files, checkpoints and pictures, which are filled and written.
+        stopwatch: Stopwatch of the models, which is advanced.
+
     Returns:
         Number of the last window, and time spent on writing fields [s].
 
     Raises:
         EnergyError: The energy balance is violated; on every rank, see ``EnergyBalance.judge``.
+        InvertedElementError: An element is inverted; only on the rank that has it.
     """
     plan = next(iter(participants.values())).plan
     field_windows = set(np.linspace(0, plan.windows, outputs.field_samples).round().astype(int).tolist())
@@ -117,7 +127,15 @@ def run_time_loop(
 
 
 def is_over(world: MPI.Comm, outputs: Outputs) -> bool:
-    """Return whether the run may end early; collective, decided on rank 0, which has the samples of the history."""
+    """Return whether the run may end early, on all ranks; collective.
+
+    Rank 0, which has the samples of the history, decides by ``outputs.is_over``: for a drop that may end early this is
+    the case when the joint stresses have settled (``settled.is_settled``). Without that function the run never does.
+
+    Args:
+        world: Communicator of all ranks.
+        outputs: Outputs of the run.
+    """
     if outputs.is_over is None:
         return False
     ACTIVITY.wait_for("the decision of rank 0 whether the run is over")
@@ -141,10 +159,16 @@ def _take_samples(participants: Participants, outputs: Outputs, window: int) -> 
 
 
 def run_window(participants: Participants, stopwatch: Stopwatch) -> None:
-    """Advance all models of this rank by one window in turn.
+    """Advance all models of this rank by one window: all begin it in turn, then all finish it in turn.
+
+    A window is the time between two exchanges of macro and meso model, or a step of a single model.
+
+    Args:
+        participants: Models of this rank with their motion, in the order of their turns.
+        stopwatch: Stopwatch that adds up the time of each model.
 
     Raises:
-        InvertedElementError: An element of this rank is inverted.
+        InvertedElementError: An element of this rank is inverted; the message names the time.
     """
     stopwatch.start()
     try:

@@ -76,6 +76,13 @@ def treatment_of(request: RunInput | StructureInput, mass_scaled_step: float | N
 def divide_on_root(world: MPI.Comm, divide: Callable[[], DividedModels[TablesT_co]]) -> DividedModels[TablesT_co]:
     """Divide the models on rank 0 and broadcast all data except the meshes; collective.
 
+    Args:
+        world: Communicator of all ranks.
+        divide: Function without arguments that divides the models; called on rank 0 only.
+
+    Returns:
+        Divided models, with an empty ``meshes`` on all ranks but rank 0.
+
     Raises:
         AgreedError: The division failed on rank 0; on every rank.
     """

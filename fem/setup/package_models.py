@@ -43,6 +43,13 @@ COARSE = "board"  # material role of the macro model
 def divide_package(world: MPI.Comm, request: RunInput) -> DividedModels[JointTables]:
     """Read, check and divide all meshes on rank 0, and broadcast the result; collective.
 
+    Args:
+        world: Communicator of all ranks.
+        request: Input of the run, with the paths of the meshes.
+
+    Returns:
+        Meshes (on rank 0 only), tables, time steps and coupling scheme of the models.
+
     Raises:
         AgreedError: The meshes do not fit the input; on every rank.
     """
@@ -156,6 +163,10 @@ def build_elastic_package(request: RunInput) -> tuple[Model[JointTables], float]
     """Return package and board as one linear elastic model on a single rank, and its mass [kg].
 
     Coarse joints are used if a mesh of them exists, since the modes of the board do not depend on joint details.
+    Plasticity, watch points and gauges of the input are ignored; supports and lumped masses are included.
+
+    Args:
+        request: Input of the run; its meshes are read.
     """
     coupling = request.shock.coupling.model_copy(update={"fine_joints": "all", "direction": "two_way"})
     meshes = (request.meshes[0], request.coarse_joints) if request.coarse_joints else request.meshes

@@ -58,10 +58,14 @@ def build_structure(comm: MPI.Comm, request: StructureInput, pulses: list[float]
     Args:
         comm: Communicator of all ranks of the run.
         request: Input of the run.
-        pulses: Durations of the load pulses [s].
+        pulses: Durations of the load pulses [s]; the shortest limits an implicit step.
+
+    Returns:
+        Model of this rank, and the time steps, equal on all ranks apart from the mass factors.
 
     Raises:
         AgreedError: The mesh does not fit the input; on every rank.
+        StepError: The step of the input is above the critical step.
     """
     mesh, tables = _read_structure(comm, request)
     local = distribute(comm, mesh)
@@ -113,6 +117,13 @@ def _choose_steps(comm: MPI.Comm, rank_elements: RankElements, request: Structur
 def divide_structure(world: MPI.Comm, request: StructureInput) -> DividedModels[StructureTables]:
     """Read, check and divide the mesh of a structure on rank 0, and broadcast the result; collective.
 
+    Args:
+        world: Communicator of all ranks.
+        request: Input of the run, with the path of the mesh.
+
+    Returns:
+        Meshes (on rank 0 only), tables, time steps and coupling scheme of the macro and meso model.
+
     Raises:
         AgreedError: The mesh does not fit the input or cannot be divided; on every rank.
     """
@@ -125,14 +136,39 @@ def build_coupled(
     request: StructureInput,
     ranks: Mapping[Role, NDArray[np.int32]],
 ) -> dict[Role, StructureModel]:
-    """Distribute and assemble the coupled models of this rank; ``ranks`` as ``distribute_models``; collective."""
+    """Distribute and assemble the coupled models of this rank; collective.
+
+    Args:
+        comms: Communicators of the run and of its models.
+        divided: Models before distribution.
+        request: Input of the run.
+        ranks: Rank of each cell, shape (ne,), of every model that is on several ranks; used on rank 0.
+
+    Returns:
+        Models of this rank, ``macro``, ``meso`` or both.
+    """
     rank_elements = distribute_models(comms, divided, ranks, request)
     bodies = assemble_bodies(comms, divided, rank_elements, request.kinematics)
     return {role: Model(divided.tables[role], body) for role, body in bodies.items()}
 
 
 def divide_on_one_rank(request: StructureInput) -> DividedModels[StructureTables]:
-    """Read, check and divide the mesh of a structure; raises as ``structure_tables`` and ``division.checks``."""
+    """Read, check and divide the mesh of a structure into macro and meso model; not collective.
+
+    Args:
+        request: Input of the run, whose dynamics must have coupling settings.
+
+    Returns:
+        Meshes, tables, time steps and coupling scheme of both models.
+
+    Raises:
+        MeshError: The file, its layers or a watch point does not fit the input.
+        TieError: Layers with different meshes do not touch.
+        LoadError: A load, support or mass does not fit the mesh.
+        CouplingError: A model is empty, a step is unstable, or the scheme does not support the supports.
+        LevelError: The critical steps differ by more than the levels allow.
+        PulseError: A pulse is shorter than a window, the time between two exchanges of the models.
+    """
     coupling, dynamics = request.dynamics.coupling, request.dynamics
     assert coupling is not None
     whole = tie_layers(read_mesh(request.mesh), request)
