@@ -27,8 +27,7 @@ FLOW, LOGARITHM, CEILING, BEFORE, INVERSE = (NOMINAL + LANES * k for k in range(
 
 
 def bit_pattern(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    """Generate the LLVM instruction that reinterprets the bits of a value; Numba calls it for ``bits_of`` and
-    ``float_of``.
+    """Generate the LLVM instruction that reinterprets the bits of a value; Numba calls it to compile ``bits_of``.
 
     Args:
         context: Numba's target context, which translates types.
