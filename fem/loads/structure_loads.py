@@ -96,5 +96,10 @@ def unit(direction: tuple[float, float, float]) -> NDArray[np.float64]:
 
 
 def damping_loads(damping: Damping, body: Body) -> list[Load]:
-    """Return the Rayleigh damping of a structure as a list with one load, or an empty list without damping."""
+    """Return the Rayleigh damping of a structure as a list with one load, or an empty list without damping.
+
+    Args:
+        damping: Coefficients of mass-proportional [1/s] and stiffness-proportional [s] damping.
+        body: Model on this rank.
+    """
     return [RayleighDamping.build(body, *damping.coefficients)] if any(damping.coefficients) else []

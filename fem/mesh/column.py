@@ -30,7 +30,12 @@ SAME = 1e-6  # of a column's size: distance of nodes that neighbouring columns s
 
 
 def insert_columns(mesh: MeshData) -> MeshData:
-    """Replace boxes by the columns of fine joints, and name the facets that ``tie_joints`` ties.
+    """Replace boxes of the coarse mesh by the columns of fine joints, and name the facets that ``tie_joints`` ties.
+
+    A column is the part of board and package around a fine joint, with its own mesh.
+
+    Args:
+        mesh: Mesh with all boxes and columns, which overlap; returned unchanged if it has no columns.
 
     Raises:
         MeshError: The boxes in place of a column do not have its volume, or neighbouring columns do not match.

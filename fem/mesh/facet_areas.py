@@ -67,11 +67,18 @@ def outward_facets(mesh: MeshData, name: str) -> OutwardFacets:
 
 
 def outward_areas(mesh: MeshData, name: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Integrate shape function times outward normal over a facet set; errors as in ``outward_facets``.
+    """Integrate shape function times outward normal over a facet set.
+
+    Args:
+        mesh: Mesh with the facet set.
+        name: Name of the facet set.
 
     Returns:
         Nodes, shape (k,), and their area vectors, shape (k, 3) [m^2]; a pressure p gives the nodal forces -p times
         these vectors.
+
+    Raises:
+        LoadError: The set does not exist or is empty, or one of its facets belongs to no cell.
     """
     outward = outward_facets(mesh, name)
     areas = area_vectors(mesh.points[outward.facets]) * outward.sign[:, None, None]

@@ -95,10 +95,10 @@ def _nearest_to_axis(points: NDArray[np.float64], nodes: NDArray[np.integer]) ->
 
 
 def whole_watch(mesh: MeshData, thickness: float) -> WatchTable:
-    """Return the watch table of a whole mesh.
+    """Return the watch table of a whole mesh: nodes, pad faces and layers whose histories are recorded.
 
     Args:
-        mesh: Whole mesh.
+        mesh: Whole mesh of board, package and joints.
         thickness: Thickness of the layers at the pads over which stress and plastic flow are averaged [m].
 
     Raises:
