@@ -99,7 +99,14 @@ class Report(Protocol):
 
 
 def write_result(comms: Communicators, report: Report, outcome: Outcome[Any], timings: Timings) -> None:
-    """Write ``history.npz`` and ``result.json`` on rank 0; collective."""
+    """Write ``history.npz`` and ``result.json`` to the output folder on rank 0; collective.
+
+    Args:
+        comms: Communicators of the run and of its models.
+        report: Problem-specific part of ``result.json``, with the input and its output folder.
+        outcome: Results of the run: models, steps, history and peaks.
+        timings: Wall-clock times [s].
+    """
     summary, output = report.summary(comms, outcome), report.request.output
     if comms.world.rank == 0:
         outcome.history.write(output)
@@ -119,6 +126,13 @@ def quantity(value: Any, unit: str = "") -> dict[str, Any]:
 
 def model_summary(comms: Communicators, steps: Steps, mode: str) -> dict[str, Any]:
     """Return mode, ranks, time steps and masses of a run.
+
+    A window is the time between two exchanges of macro and meso model, or a step of a single model.
+
+    Args:
+        comms: Communicators of the run and of its models.
+        steps: Time steps and masses.
+        mode: Name of the mode, returned unchanged.
 
     Returns:
         ``mode`` (as given), ``ranks`` (count), ``placement`` (name), ``critical_steps`` (material role -> step [s]),
@@ -173,7 +187,9 @@ def health(
         more: Additional checks, name -> (value, limit).
 
     Returns:
-        Checks as in ``make_checks``.
+        Name -> ``{"value", "limit", "ok"}``, where ``ok`` means that the value is at most the limit. Names are
+        ``energy_balance_error``, those of ``more``, ``added_mass_fraction`` and, for hexahedra with hourglass energy,
+        ``hourglass_energy_fraction``.
     """
     balance, steps = outcome.history.balance, outcome.steps
     checks = {
@@ -196,5 +212,9 @@ def _hourglass_check(history: History, formulation: str) -> dict[str, tuple[floa
 
 
 def make_checks(checks: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
-    """Return checks, name -> (value, limit), as name -> ``{"value", "limit", "ok"}``; ``ok``: value at most limit."""
+    """Return health checks for ``result.json``: name -> ``{"value", "limit", "ok"}``.
+
+    Args:
+        checks: Name -> (value, limit); ``ok`` is true if the value is at most the limit.
+    """
     return {name: {"value": value, "limit": limit, "ok": value <= limit} for name, (value, limit) in checks.items()}

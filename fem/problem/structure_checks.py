@@ -26,7 +26,14 @@ COUPLING = "dynamics.coupling"
 
 
 def problems(problem: StructureProblem) -> list[Problem]:
-    """Return the contradictions between parameters of a structure, empty if there are none; nothing is computed."""
+    """Return the contradictions between parameters of a structure, empty if there are none; nothing is computed.
+
+    Args:
+        problem: Parameters of the structure.
+
+    Returns:
+        Input errors, each with key, message, value and allowed range.
+    """
     return [
         *_structure(problem),
         *attachment_problems(problem),
