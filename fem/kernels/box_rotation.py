@@ -90,7 +90,7 @@ def add_faces(w, start, count, faces):
 def transform_corners(w):
     """Replace the values at eight corners of sixteen elements by their Walsh-Hadamard transform, in place.
 
-    ``w (>= 384,)``: component c at corner a of element e, then of the mode of parity a, at ``16 (3 a + c) + e``.
+    ``w (>= 384,)``: component c of corner a of element e, then of mode a (bit d: odd along d), at ``16 (3 a + c) + e``.
     """
     for component in range(3):
         v = w[LANES * component :]
@@ -106,7 +106,7 @@ def transform_corners(w):
 
 @njit(**LANE_OPTIONS)
 def write_deformation(k, w):
-    """Write the mean deformation gradients F of sixteen boxes; ``k (480,)`` from ``spread_shape`` has the scales [1/m].
+    """Write the mean deformation gradients F of sixteen boxes; ``k (480,)`` from ``spread_shape`` scales modes to F.
 
     ``w (672,)``: reads component c of mode p of box e at ``16 (3 p + c) + e`` [m], writes F at ``384 + 16 i + e``.
     """
@@ -169,9 +169,9 @@ def spin(u, moment):
 
 @njit(**LANE_OPTIONS)
 def resist(k, w):
-    """Replace the higher modes of sixteen boxes by the forces Q^ [N], and write their moments [J] to mode 0.
+    """Replace the modes xy, xz, yz, xyz of sixteen boxes by the forces on them [N]; write their moments [J] to mode 0.
 
-    ``k (480,)`` from spread_shape; ``w (672,)``: mode p of box e at ``16 (3 p + c) + e`` [m], R at ``528 + 16 i + e``.
+    ``w (672,)``: p = 3, 5, 6, 7 of box e at ``16 (3 p + c) + e``, R at ``528 + 16 i + e``; ``k`` from ``spread_shape``.
     """
     for lane in range(LANES):
         back = transposed(nine(w, ROTATION + lane))
@@ -188,9 +188,9 @@ def resist(k, w):
 
 @njit(**LANE_OPTIONS)
 def write_stress(k, w):
-    """Replace F of sixteen boxes by P [J], given R and the moments of ``resist``; ``k (480,)`` from ``spread_shape``.
+    """Replace the deformation gradients F of sixteen boxes by forces P [J] on them; ``k (480,)`` from ``spread_shape``.
 
-    ``w (672,)``: F, then P, of box e at ``384 + 16 i + e``, R at ``528 + 16 i + e``, moments [J] at ``16 c + e``.
+    ``w (672,)``: F, then P, of box e by rows at ``384 + 16 i + e``, R at ``528 + 16 i + e``, moments at ``16 c + e``.
     """
     for lane in range(LANES):
         r, higher = nine(w, ROTATION + lane), three(w, lane)
@@ -218,9 +218,9 @@ def write_linear_forces(k, w):
 
 @njit(**LANE_OPTIONS)
 def turn_higher(w):
-    """Rotate the forces Q^ [N] on the higher modes of sixteen boxes by R, in place.
+    """Rotate the forces [N] on the modes xy, xz, yz, xyz of sixteen boxes by their rotations R, in place.
 
-    ``w (672,)``: component c on modes p = 3, 5, 6, 7 of box e at ``16 (3 p + c) + e``, R at ``528 + 16 i + e``.
+    ``w (672,)``: component c for p = 3, 5, 6, 7 of box e at ``16 (3 p + c) + e``, R row by row at ``528 + 16 i + e``.
     """
     for lane in range(LANES):
         r = nine(w, ROTATION + lane)
@@ -330,7 +330,7 @@ def row_energies(rows, scales, constants, displacement):
     """Return the total energies of mean strains and of higher modes of rows of boxes, two scalars [J].
 
     ``rows (nr, 6)``: positions where four lines begin, number of boxes, shape; ``scales (ns, 3)``: -1 / (4 h) [1/m];
-    ``constants (ns, 27)`` of shapes; ``displacement (3, >= p + PAD)``: along the lines [m].
+    ``constants (ns, 27)``: of ``box_constants``; ``displacement (3, >= p + PAD)``: component by position in lines [m].
     """
     faces, w, k = np.zeros((3, 4, WIDTH)), np.zeros(TURNED_SLOTS), np.empty(SCALE + 3 * LANES)
     mean = higher = 0.0
@@ -382,8 +382,8 @@ def add_turned_block_forces(cells, filled, constants, displacement, force):
 def block_energies(cells, filled, constants, displacement):
     """Return the total energies of mean strains and of higher modes of boxes in blocks, two scalars [J].
 
-    ``cells (nb, 8, 16)``: nodes; ``filled (nb,)``: boxes of each block; ``constants (nb, 480)``: entry i of box e at
-    ``16 i + e``; ``displacement (n, 3)``: nodal [m].
+    ``cells (nb, 8, 16)``: nodes; ``filled (nb,)``: boxes of each block; ``constants (nb, 480)``: 27 + 3 scales,
+    entry i of box e at ``16 i + e``; ``displacement (n, 3)``: nodal [m].
     """
     w = np.zeros(TURNED_SLOTS)
     mean = higher = 0.0

@@ -91,7 +91,7 @@ def forces_of(arrays):
 
 @njit(cache=True)
 def paced_forces_of(arrays, every):
-    """Return ``PacedForces``; ``arrays``: three ``Forces`` in a tuple; ``every``: their intervals in steps, (3,)."""
+    """Return ``PacedForces``; ``arrays``: tuple of three ``Forces``; ``every (3,)``: intervals in steps, 0: unused."""
     return PacedForces(arrays, every)
 
 
@@ -194,8 +194,8 @@ def take_steps(motion, forces, interface, accelerations, step):
         step: Time step dt, scalar [s].
 
     Returns:
-        Work of the accelerations [J], for their steady part by the displacement of all masses; steps taken, fewer than
-        m if an element is inverted; then its term (index into ``NAMES``), block or row, and pace, else -1, 0, 0.
+        Work of the accelerations [J], for their steady part by the displacement of all masses; steps taken, m or up to
+        an inverted element; then its term (index into ``NAMES``), block or row, and pace (0 to 2), else -1, 0, 0.
     """
     displacement, velocity, force = motion.state[0], motion.state[1], motion.state[2]
     last, pushed, every = len(accelerations) - 1, np.zeros_like(motion.ahead), forces.every
@@ -271,9 +271,9 @@ def move_nodes(motion, block, body, step):
 
 @njit(cache=True)
 def move_interface(interface, block, velocity):
-    """Set ``velocity (n, 3)`` [m/s] at nodes of an ``Interface`` to its mean over some steps.
+    """Set ``velocity (n, 3)`` [m/s] at nodes of an ``Interface`` to their prescribed mean velocity over some steps.
 
-    ``block``: first node, end of the nodes concerned, number of steps and number of the last of them (from 1).
+    ``block``, a tuple: first node, end of the range of nodes, number of steps and number of the last of them (from 1).
     """
     begin, end, count, substep = block
     x = y = z = 0.0
@@ -293,7 +293,7 @@ def add_paced_forces(motion, forces, substep, pushed, final):
     """Add the forces of ``PacedForces`` that act after step ``substep`` to ``StepArrays``, each for its interval.
 
     If ``final``, later steps' shares go to ``ahead``; workspace ``pushed (n, 3)`` stays 0. Returns three scalars: those
-    of ``add_forces`` (-1 and 0, or term and block of an inverted element) and pace.
+    of ``add_forces`` (-1 and 0, or term and block of an inverted element) and pace (0 to 2).
     """
     force = motion.state[2]
     for pace in range(PACES):
@@ -383,8 +383,8 @@ def run_levels(levels, first, values, force):
     For levels with one assembled matrix and no node of another rank; same operations and order as the kernels above.
 
     Args:
-        levels: Tuple per level, outermost first: rows (n,), foreign (0,), coefficients (p, 3), inverse and change
-            (nf, 3), state (3, n, 3), as in ``take_substep``; pointer, columns, blocks as in ``add_block_force``.
+        levels: Tuples, outermost first: arguments rows, foreign, coefficients (p, 3), inverse, change, state of
+            the kernels above; row pointers (n + 1,), columns (nb,), blocks (nb, 3, 3) of its stiffness [N/m].
         first: Index of the level, scalar.
         values: Displacement of the surrounding level, shape (>= n, 3) [m].
         force: Force of the surrounding level, shape (>= n, 3) [N], added to.
