@@ -171,7 +171,13 @@ def seconds_of_step(terms: Sequence[ForceTerm], nodes: int) -> float:
 
 
 def measured_latency(world: MPI.Comm) -> float:
-    """Return the median time of a message between neighbouring ranks, the largest of all ranks [s]; collective."""
+    """Return the time of a message between neighbouring ranks [s]; collective.
+
+    Each rank takes the median of several messages; the largest of all ranks is returned, zero for a single rank.
+
+    Args:
+        world: Communicator of all ranks.
+    """
     sent, received = np.zeros((MESSAGE_ROWS, 3)), np.empty((MESSAGE_ROWS, 3))
     previous, following = (world.rank - 1) % world.size, (world.rank + 1) % world.size
     world.Barrier()

@@ -91,7 +91,11 @@ BUILDERS: Mapping[type[Pulsed], Builder] = {
 
 
 def unit(direction: tuple[float, float, float]) -> NDArray[np.float64]:
-    """Return the unit vector along a direction, shape (3,)."""
+    """Return the unit vector along a direction, shape (3,).
+
+    Args:
+        direction: Components along x, y, z, not all zero.
+    """
     return np.array(direction) / np.linalg.norm(direction)
 
 

@@ -48,6 +48,10 @@ def pulse_of(load: StructureLoad) -> Pulse:
 
 
 def pulse_durations(pulses: Mapping[str, Pulse]) -> list[float]:
-    """Return the durations of all pulses that are not constant [s]."""
+    """Return the durations of all pulses that are not constant [s]; empty if all are constant.
+
+    Args:
+        pulses: Name of a load -> its pulse; a table lasts from its first to its last time.
+    """
     sines = [pulse.duration for pulse in pulses.values() if isinstance(pulse, HalfSine | Haversine)]
     return sines + [float(np.ptp(pulse.times)) for pulse in pulses.values() if isinstance(pulse, Tabulated)]

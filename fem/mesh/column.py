@@ -95,7 +95,11 @@ def _shared_facets(cells: NDArray[np.int32], gone: NDArray[np.bool_]) -> NDArray
 
 
 def drop_stale_facets(mesh: MeshData) -> MeshData:
-    """Drop the facets that belong to no cell any more."""
+    """Return the mesh without the facets that are no face of any cell; empty facet sets remain.
+
+    Args:
+        mesh: Mesh with at least one facet set.
+    """
     has_cell = cells_of_facets(mesh.cells, np.concatenate(list(mesh.facets.values()))) >= 0  # one search sorts all
     ends = np.cumsum([len(some) for some in mesh.facets.values()])[:-1]
     sets = zip(mesh.facets.items(), np.split(has_cell, ends), strict=True)

@@ -207,5 +207,10 @@ def check_tie(tie: Tie, points: NDArray[np.float64]) -> None:
 
 
 def net_load(points: NDArray[np.float64], force: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the net force [N] and moment about the origin [N m] of forces (n, 3) at points (n, 3), shape (6,)."""
+    """Return the net force [N] and net moment about the origin [N m] of point forces, shape (6,), force first.
+
+    Args:
+        points: Points of action, shape (n, 3) [m].
+        force: Force at each point, shape (n, 3) [N].
+    """
     return np.concatenate([force.sum(axis=0), np.cross(points, force).sum(axis=0)])

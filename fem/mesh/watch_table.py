@@ -65,7 +65,11 @@ class WatchTable:
 
 
 def joint_names(mesh: MeshData) -> tuple[str, ...]:
-    """Return the names of the joints, which follow ``solder@`` in part names, in the order of the mesh."""
+    """Return the names of the joints in the order of the mesh's part names; empty without joints.
+
+    Args:
+        mesh: Mesh in which the solder of a joint is the part ``solder@<joint>``.
+    """
     return tuple(name.split("@")[1] for name in mesh.part_names if name.startswith("solder@"))
 
 

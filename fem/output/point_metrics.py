@@ -18,7 +18,8 @@ def point_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
     """Return the peaks at watch points and supports as metrics, each as ``{"value": ..., "unit": ...}``.
 
     Args:
-        arrays: Arrays of ``history.npz`` by name.
+        arrays: Arrays of ``history.npz`` by name, with the histories of watch points and supports; empty result without
+            any.
 
     Returns:
         For each watch point ``peak_displacement@<name>``, ``displacement_range@<name>`` [m], ``peak_strain@<name>``,

@@ -120,7 +120,12 @@ def write_result(comms: Communicators, report: Report, outcome: Outcome[Any], ti
 
 
 def quantity(value: Any, unit: str = "") -> dict[str, Any]:
-    """Return a metric for ``result.json``, ``{"value": value, "unit": unit}``; an empty unit means dimensionless."""
+    """Return a metric for ``result.json``, ``{"value": value, "unit": unit}``.
+
+    Args:
+        value: Number or text that JSON can store.
+        unit: Unit of the value; empty for dimensionless numbers and texts.
+    """
     return {"value": value, "unit": unit}
 
 
@@ -172,7 +177,7 @@ def sizes(comms: Communicators, models: Mapping[Role, Model[Any]]) -> tuple[dict
 
 
 def peak_memory() -> int:
-    """Return the peak memory of this process so far [B]."""
+    """Return the peak memory of this process, from its start until now [B]; each rank has its own."""
     return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 

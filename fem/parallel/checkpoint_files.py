@@ -107,7 +107,7 @@ def header_of(path: Path) -> Header | None:
 
 
 def warn(message: str) -> None:
-    """Print a warning that the launcher displays."""
+    """Print a warning to standard output as a JSON line, ``{"warning": message}``, that the launcher displays."""
     print(json.dumps({"warning": message}), flush=True)
 
 
