@@ -25,6 +25,15 @@ def ratio_of(name: str, metrics: Metrics, reference: Metrics) -> Ratio:
     """Return the ratio of a metric of ``RATIOS`` to that of a reference.
 
     Joint metrics are those of the critical joint of each design.
+
+    Args:
+        name: Key of ``RATIOS``.
+        metrics: Name -> record with ``value`` (SI) and ``unit``, of this run.
+        reference: The same of the reference design.
+
+    Returns:
+        Ratio; None with the reason if a run lacks the metric, its reference is not positive, or plastic work is
+        averaged over different layers.
     """
     for owner, values in (("this run", metrics), ("the reference", reference)):
         if name not in values:
