@@ -90,7 +90,7 @@ def mirror_particles(
 
     Args:
         points: Particle positions, shape (n, 3) [m].
-        plates: Walls; without any there are no ghosts.
+        plates: Walls; an empty sequence gives no ghosts.
         reach: Distance from a plate up to which particles are mirrored [m].
         slip_lengths: Slip length of each plate [m], 0 without slip; None for free slip on all plates.
 

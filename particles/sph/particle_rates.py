@@ -335,7 +335,7 @@ def condition_of(moments, dimension):
     """Return an upper bound of the condition number of a symmetric matrix; infinite if singular.
 
     The largest eigenvalue is at most the trace, and the middle one at most half of it. In a plane only x and z count.
-    ``moments`` are its entries xx, yy, zz, xy, yz, xz; ``dimension`` is that of the flow, 1 to 3.
+    ``moments`` are its entries xx, yy, zz, xy, yz, xz; ``dimension`` counts those of the flow, 1 to 3.
     """
     xx, yy, zz, xy, yz, xz = moments
     if dimension == 1:
