@@ -15,6 +15,10 @@ from reflowshock.fem.mesh.mesh import MeshData, cells_of_facets
 def facet_set(mesh: MeshData, name: str) -> NDArray[np.int32]:
     """Return the node numbers of the facets of a set, shape (nf, m), in the order of ``MeshData.facets``.
 
+    Args:
+        mesh: Mesh with the facet set.
+        name: Name of the facet set.
+
     Raises:
         LoadError: The mesh has no such set, or it is empty.
     """
@@ -51,10 +55,14 @@ class OutwardFacets:
 
 
 def outward_facets(mesh: MeshData, name: str) -> OutwardFacets:
-    """Return a facet set with its outward direction.
+    """Return a facet set with the cell of each facet and the sign of its normal (+1 outwards by the right-hand rule).
+
+    Args:
+        mesh: Mesh with the facet set.
+        name: Name of the facet set.
 
     Raises:
-        LoadError: The set does not exist, or one of its facets belongs to no cell.
+        LoadError: The set does not exist or is empty, or one of its facets belongs to no cell.
     """
     facets = facet_set(mesh, name)
     cells = cells_of_facets(mesh.cells, facets)

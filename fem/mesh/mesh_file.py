@@ -39,7 +39,10 @@ def read_meshes(paths: Sequence[Path]) -> MeshData:
 
 
 def read_mesh(path: Path) -> MeshData:
-    """Read one Gmsh 4.1 file.
+    """Read one Gmsh 4.1 file as a mesh whose parts are its physical volumes and whose facet sets its physical surfaces.
+
+    Args:
+        path: File to be read.
 
     Raises:
         MeshError: The file has no cells of a supported shape, several shapes, a cell in no or several volumes, or a

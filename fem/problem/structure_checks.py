@@ -46,7 +46,10 @@ def problems(problem: StructureProblem) -> list[Problem]:
 
 
 def check(problem: StructureProblem) -> None:
-    """Raise an error if the parameters of a structure contradict each other.
+    """Raise an error if the parameters of a structure contradict each other; no mesh is needed.
+
+    Args:
+        problem: Parameters of the structure.
 
     Raises:
         ValueError: The message lists all contradictions, one per line.
