@@ -45,7 +45,7 @@ def viscosity_of(i, fluids, neighbours, fields, law):
     Args:
         i: Number of the particle, integer.
         fluids: Number of liquid particles, integer.
-        neighbours: Row of the particle, liquid neighbours first, shape (k,).
+        neighbours: Numbers of its neighbours, liquid ones first, shape (k,).
         fields: ``Fields`` of all particles.
         law: ``Law`` of the particles, with the viscosity law.
     """
