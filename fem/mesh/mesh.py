@@ -50,6 +50,9 @@ class MeshData:
 def append(meshes: Sequence[MeshData]) -> MeshData:
     """Concatenate meshes without merging nodes; parts and facet sets of equal name are joined.
 
+    Args:
+        meshes: Meshes, at least one; nodes and cells are numbered in this order.
+
     Raises:
         MeshError: The meshes have cells of different shapes.
     """
@@ -80,6 +83,9 @@ def append(meshes: Sequence[MeshData]) -> MeshData:
 
 def without_unused_nodes(data: MeshData) -> tuple[MeshData, NDArray[np.int32]]:
     """Drop the nodes that belong to no cell, and the facets with such a node.
+
+    Args:
+        data: The mesh, with n nodes.
 
     Returns:
         The mesh, and the new number of each old node, -1 for dropped nodes, shape (n,).

@@ -184,6 +184,10 @@ def project(
 def check_tie(tie: Tie, points: NDArray[np.float64]) -> None:
     """Check a tie on its points: partition of unity, linear fields, net force and moment of unit forces.
 
+    Args:
+        tie: Slaves, masters and weights.
+        points: Nodes of the mesh, with the slaves on their facets, shape (n, 3) [m].
+
     Raises:
         TieError: One of them is not exact to 1e-12.
     """

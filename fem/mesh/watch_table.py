@@ -83,7 +83,8 @@ def _footprint(mesh: MeshData) -> NDArray[np.float64]:
 def centre_nodes(mesh: MeshData) -> NDArray[np.int64]:
     """Return the nodes nearest to the axis x = y = 0 on the board's lower face and the die's upper face, shape (2,).
 
-    A node is -1 if the mesh has no such part.
+    Args:
+        mesh: Mesh of package and board; a node is -1 if the mesh has no such part.
     """
     board = mesh.facet_nodes("board_bottom")
     die = np.unique(mesh.cells[mesh.in_parts("die".__eq__)])

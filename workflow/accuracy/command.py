@@ -224,7 +224,11 @@ def show(request: AccuracyRequest, out: Path | None, console: Console) -> bool:
 
 
 def is_within_tolerance(accuracy: Accuracy) -> bool:
-    """Return whether the recommended settings were run and their measured error is within the user's tolerance."""
+    """Return whether the recommended settings were run and their measured error is within the user's tolerance.
+
+    Args:
+        accuracy: Convergence study; without a tolerance any measured error is accepted.
+    """
     chosen = accuracy.recommended
     if chosen is None or chosen.found is None or accuracy.judged not in chosen.found.errors:
         return False
