@@ -87,7 +87,7 @@ def plan(
         bool, typer.Option("--json", help="print stages, effects and predicted times for a script")
     ] = False,
 ) -> None:
-    """Show the stages that a run would execute and their predicted cost, without running them."""
+    """Show the stages that a run would execute, why, and their predicted cost, without running them."""
     from reflowshock.workflow.plan import plan_record, show_plan
     from reflowshock.workflow.run import WHAT
 
@@ -116,7 +116,11 @@ def run(
     ] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", "-n", help="show what would run and its cost, as plan")] = False,
 ) -> None:
-    """Run all stages that are missing, stale or damaged; ends with the verdict on the design."""
+    """Run all stages that are missing, stale or damaged; ends with the verdict on the design.
+
+    The exit code is 0 if all stages up to --until are complete and healthy, 1 if not or if a long run is declined, and
+    3 if only --fail-on-verdict objects. Products are in the run folder, by default runs/<case name>-<scale>.
+    """
     from reflowshock.workflow.jobs.batch import machine_of
     from reflowshock.workflow.pipeline.gate import ask_if_long
     from reflowshock.workflow.plan import predicted_seconds, show_plan
@@ -162,7 +166,7 @@ def accuracy(
     oversubscribe: Oversubscribe = False,
     force: Force = False,
 ) -> None:
-    """Run a convergence study: errors and costs of settings; recommend settings and run them."""
+    """Run a convergence study; recommend and run the cheapest settings within a tolerance, or the best in a budget."""
     from reflowshock.workflow.accuracy.command import read_request, show
 
     request = replace(read_request(case, settings or [], tolerance, budget), oversubscribe=oversubscribe, force=force)
@@ -180,7 +184,7 @@ def status(
         bool, typer.Option("--follow", "-f", help="watch a run that another terminal has started, until it ends")
     ] = False,
 ) -> None:
-    """Show the state of a run folder: stages done, stale, damaged or missing, with times and key results."""
+    """Show stages done, stale, damaged or missing in a run folder, with times and key results; changes nothing."""
     from reflowshock.workflow.status import follow_run, show_status
 
     store, point = _load(case, settings, out, True, True)
@@ -198,7 +202,7 @@ def report(
     show: Annotated[bool, typer.Option("--open", help="open it in the browser")] = False,
     movie: Annotated[Path | None, typer.Option(metavar="FILE.gif", help="also write its animation as a GIF")] = None,
 ) -> None:
-    """Write the report again from the existing products."""
+    """Rewrite report.html and summary.json in the run folder from the existing products, without computing anything."""
     from reflowshock.workflow.pipeline.report import write_report
     from reflowshock.workflow.run import check_movie, report_again, write_run_movie
     from reflowshock.workflow.stages import report as stage_function
@@ -222,7 +226,7 @@ def report(
 
 @app.command()
 def verify(case: CasePath, settings: Settings = None, out: Out = None) -> None:
-    """Verify that all products of a run folder exist and are unchanged."""
+    """Verify that all products in a run folder exist and are unchanged: exit code 0 if so, else 1."""
     from reflowshock.workflow.run import verify as verify_run
 
     raise typer.Exit(0 if verify_run(*_load(case, settings, out, True, True)) else 1)
@@ -238,7 +242,7 @@ def clean(
     ] = False,
     force: Force = False,
 ) -> None:
-    """Remove the program's own files from a run folder."""
+    """Remove the program's own files from a run folder, or with --unused only superseded ones; other files stay."""
     from reflowshock.workflow.run import clean as clean_run
 
     store, point = _load(case, settings, out, True, True)
@@ -261,7 +265,7 @@ def stress_test(
     ] = None,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="results")] = Path("runs/stress-test"),
 ) -> None:
-    """Run hard and random cases and check that each stays within its bounds."""
+    """Run hard and random cases and check that each stays within its bounds; write results, exit code 0 if all do."""
     from reflowshock.workflow.stress_test.command import RANDOM_COUNT, Request
     from reflowshock.workflow.stress_test.command import stress_test as try_cases
 
@@ -279,7 +283,7 @@ def effects(
     ] = None,
     settings: Settings = None,
 ) -> None:
-    """Show all effects, or the effects of a case: on or off and why, expected influence, share of the cost."""
+    """Show all effects of the program, or those of a case: on or off, why, expected influence, share of the cost."""
     from reflowshock.workflow.effects.page import show_effects, show_registry
 
     if case is None:
@@ -302,7 +306,7 @@ def study(
     force: Force = False,
     yes: Yes = False,
 ) -> None:
-    """Run a parametric study; only missing points are computed. Writes tables, plots and a page."""
+    """Run a parametric study: compute only missing points, write tables, plots and a page; exit code 0 if healthy."""
     from reflowshock.workflow.jobs.batch import machine_of
     from reflowshock.workflow.pipeline.gate import ask_if_long
     from reflowshock.workflow.study.command import predicted_study_seconds, read_points_of, run_study, show_forecast
@@ -325,7 +329,7 @@ def study(
 
 @app.command()
 def schema() -> None:
-    """Print the JSON schema of a case file."""
+    """Print the JSON schema (draft 2020-12) of case files of all kinds to standard output."""
     from reflowshock.workflow.pipeline.schema import case_schema
 
     print(json.dumps(case_schema(), indent=2))
@@ -339,7 +343,7 @@ def stage(
     oversubscribe: Oversubscribe = False,
     mark: Annotated[Path | None, typer.Option(help="file that marks the job as done for Snakemake")] = None,
 ) -> None:
-    """Make one product in the store in the working directory (called by Snakemake)."""
+    """Make the product of stage NAME with a store key, in the working directory's store (called by Snakemake)."""
     from reflowshock.workflow.case.run import Run
     from reflowshock.workflow.pipeline.stage_runner import execute
     from reflowshock.workflow.process.progress_file import write_progress_to

@@ -12,7 +12,11 @@ def new(
     name: Annotated[str, typer.Argument(help="name of the case; the file is NAME.toml")],
     template: Annotated[str, typer.Option(help="case to start from")] = "jedec_bga",
 ) -> None:
-    """Write a complete, commented case file."""
+    """Write a complete, commented case file.
+
+    The file NAME.toml in the current folder has every parameter of the shipped case --template, in the user's units.
+    An existing file is an error; it is not replaced.
+    """
     from reflowshock.workflow.pipeline.template import write_new_case
 
     path = write_new_case(name, template)
@@ -26,7 +30,11 @@ def init(
     board: Annotated[str | None, typer.Option(help='length x width x thickness, e.g. "132 x 77 x 1 mm"')] = None,
     drop: Annotated[str | None, typer.Option(help="service condition of JESD22-B110B, A to H")] = None,
 ) -> None:
-    """Ask five questions about a package on a board, and write a case that runs."""
+    """Ask five questions about a package on a board, and write a case that runs.
+
+    An option answers its question, which is then not asked. The file is written to the current folder under the name of
+    the case; an existing file is not replaced.
+    """
     from reflowshock.workflow.ecad.command import ask_for_case
 
     options = {"name": name, "array": array, "ball": ball, "board": board, "drop": drop}
@@ -49,7 +57,12 @@ def import_board(
     ball: Annotated[str | None, typer.Option(help="diameter of a solder ball (default: 0.6 of the pitch)")] = None,
     holes: Annotated[str | None, typer.Option(help="smallest diameter of mounting holes (default: 2 mm)")] = None,
 ) -> None:
-    """Write a case file for a component of an ECAD board."""
+    """Write a case file for a component of an ECAD board.
+
+    Without --component, outline, holes and components of the board are listed and nothing is written. Values that
+    neither the board nor an option gives are assumed and marked ASSUMED in the file, which is written to the current
+    folder.
+    """
     from reflowshock.workflow.ecad.command import read_layout, show_layout, write_case
 
     if component is None:

@@ -71,7 +71,13 @@ def plan_record(store: Store, point: Point) -> dict[str, Any]:
 
 
 def show_plan(store: Store, point: Point, console: Console) -> None:
-    """Print stages to run and why, effects, sizes, time steps, predicted cost and rank placement."""
+    """Print stages to run and why, effects, sizes, time steps, predicted cost and rank placement.
+
+    Args:
+        store: Store of the run folder, whose files are examined; nothing is changed.
+        point: Point of the run.
+        console: Console to print to.
+    """
     case = point.case
     kind, scale = kind_of(case), "" if case.scale == FULL else f", scale {case.scale}"
     outlook = kind.forecast(case)

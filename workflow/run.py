@@ -115,6 +115,10 @@ def check_movie(path: Path) -> None:
 def write_run_movie(folder: Path, path: Path) -> None:
     """Write the first animated scene of a report as a GIF.
 
+    Args:
+        folder: Run folder, whose products are read.
+        path: GIF to write; an existing one is replaced.
+
     Raises:
         CaseError: No scene is animated, since its stage has not run.
     """
@@ -178,6 +182,10 @@ def _adopt_report(store: Store, folder: Path, case: Case, write: Callable[[Path,
 
 def verify(store: Store, point: Point) -> bool:
     """Check every file of a run, in its store and in its folder, and print damaged and missing ones.
+
+    Args:
+        store: Store of the run folder; nothing is changed.
+        point: Point of the run.
 
     Returns:
         Whether all products and all files of the run folder are present and unmodified.

@@ -74,7 +74,13 @@ def _progress(store: Store, point: Point, stage: str) -> str:
 
 
 def show_status(store: Store, point: Point, console: Console) -> None:
-    """Print state, wall time and main figures of each stage of a run; nothing is changed."""
+    """Print state, wall time and main figures of each stage of a run; nothing is changed.
+
+    Args:
+        store: Store of the run folder, whose files are checked.
+        point: Point of the run.
+        console: Console to print to.
+    """
     table = Table(title=f"{point.case.case.name} in {store.folder}", title_justify="left", expand=True)
     table.add_column("stage", no_wrap=True)
     table.add_column("state", no_wrap=True)

@@ -127,8 +127,13 @@ def fit_step_cost(
 ) -> tuple[float, float]:
     """Return the fixed time of a step and the time per element [s], from two samples.
 
-    The arguments are the numbers of elements of both samples and their measured times of one step [s]. The elements
-    take at least half of the time of the large sample; a smaller share would be a disturbed measurement.
+    The elements take at least half of the time of the large sample; a smaller share would be a disturbed measurement.
+
+    Args:
+        small_count: Number of elements of the small sample.
+        small_seconds: Measured time of a step of the small sample [s].
+        large_count: Number of elements of the large sample.
+        large_seconds: Measured time of a step of the large sample [s].
     """
     count = large_count - small_count
     element = max((large_seconds - small_seconds) / count if count else 0.0, 0.5 * large_seconds / large_count)
@@ -171,7 +176,13 @@ def seconds_of_step(terms: Sequence[ForceTerm], nodes: int) -> float:
 
 
 def measured_latency(world: MPI.Comm) -> float:
-    """Return the median time of a message between neighbouring ranks, the largest of all ranks [s]; collective."""
+    """Return the time of a message between neighbouring ranks [s]; collective.
+
+    Each rank takes the median of several messages; the largest of all ranks is returned, zero for a single rank.
+
+    Args:
+        world: Communicator of all ranks.
+    """
     sent, received = np.zeros((MESSAGE_ROWS, 3)), np.empty((MESSAGE_ROWS, 3))
     previous, following = (world.rank - 1) % world.size, (world.rank + 1) % world.size
     world.Barrier()
@@ -184,9 +195,12 @@ def measured_latency(world: MPI.Comm) -> float:
 
 
 def speeds_of(seconds: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the relative speed of each rank, shape (ranks,), from its time for the same work, shape (ranks,) [s].
+    """Return the relative speed of each rank, shape (ranks,), with a mean of one.
 
-    The mean speed is one; speeds that differ only by measurement error are set equal.
+    Speeds that differ only by measurement error are set equal.
+
+    Args:
+        seconds: Time of each rank for the same work, shape (ranks,) [s].
     """
     speeds = 1.0 / seconds
     return np.ones(len(speeds)) if speeds.max() < ALIKE * speeds.min() else speeds / speeds.mean()

@@ -38,7 +38,16 @@ class Substeps:
 
     @classmethod
     def of(cls, count: int, level: int, damping: float = 0.0) -> "Substeps":
-        """Return the coefficients of ``count`` substeps of a level; other arguments as in ``stabilisation``."""
+        """Return the coefficients of the substeps of a level.
+
+        Args:
+            count: Substeps in one step of the surrounding level.
+            level: Number of the level, 1 for the outermost.
+            damping: Coefficient beta of stiffness-proportional damping over the step of the model, dimensionless.
+
+        Raises:
+            LevelError: The damping is too strong.
+        """
         delta = 1.0 + stabilisation(level, damping) / count**2
         value, slope = _chebyshev(count, delta)
         omega = 2.0 * slope[count] / value[count]

@@ -106,7 +106,11 @@ def copies(coarse: MeshData, fine: Collection[str]) -> MeshData:
 
 
 def copied_joints(mesh: MeshData) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Return masks of the cells of fine joints with a coarse copy, and of these copies, each of shape (ne,)."""
+    """Return masks of the cells of fine joints with a coarse copy, and of these copies, each of shape (ne,).
+
+    Args:
+        mesh: Mesh of a one-way run from ``read_package``; without copies both masks are False everywhere.
+    """
     copy = mesh.in_parts(lambda name: COPY in name)
     copied = {joint_of(mesh.part_names[part]) for part in np.unique(mesh.part[copy])}
     return mesh.in_parts(lambda name: joint_of(name) in copied) & ~copy, copy

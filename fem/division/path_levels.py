@@ -60,8 +60,11 @@ def _candidates(substeps: int, most: int) -> Iterator[tuple[int, ...]]:
 def opaque_ratio(fraction: float) -> float:
     """Return the ratio of a cell's step limit to the larger step above which one layer decays as much as two.
 
-    Both steps are ``fraction`` times critical steps [s]; the ratio is dimensionless. The decay exponent doubles if
+    Cells below this ratio get a second layer of cells around them. The decay exponent doubles if
     arcosh(r x) = 2 arcosh(x).
+
+    Args:
+        fraction: Step over critical step, the same for both; the result is dimensionless, too.
     """
     just = 0.5 * math.pi / fraction
     return 2.0 * just - 1.0 / just

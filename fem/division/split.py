@@ -55,6 +55,11 @@ def interface_between(whole: Whole, macro: Part, meso: Part) -> NDArray[np.intp]
     """Return the nodes of the joined mesh that both models share, without slaves, shape (nc,).
 
     A shared slave follows its masters in both models, so only the masters are coupled.
+
+    Args:
+        whole: Joined mesh with its ties.
+        macro: Part of the mesh in the macro model, or around the meso model in one-way coupling.
+        meso: Part of the mesh in the meso model.
     """
     common = (macro.number >= 0) & (meso.number >= 0)
     common[whole.tie.slave] = False

@@ -173,7 +173,9 @@ def _check_shaken(problem: StructureProblem, nodes_of: dict[str, NDArray[np.inte
 def shaken_supports(problem: StructureProblem) -> list[str]:
     """Return the names of the supports that a large mass moves: those that fix x, y and z.
 
-    Empty if no load of the structure is an input acceleration by a large mass.
+    Args:
+        problem: Parameters of the structure; the result is empty if none of its loads is an input acceleration by a
+            large mass.
     """
     by_mass = any(load.is_large_mass for load in problem.loads.values())
     return [name for name, support in problem.supports.items() if by_mass and set(support.hold) == set(AXES)]

@@ -163,7 +163,12 @@ def _mass_factors(step: NDArray[np.float64], scaled: NDArray[np.bool_], treatmen
 
 
 def touching(cells: NDArray[np.int32], nodes: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return which cells, shape (ne,), have one of the marked nodes, shape (n,)."""
+    """Return which cells have at least one of the marked nodes, shape (ne,).
+
+    Args:
+        cells: Nodes of each cell, shape (ne, k).
+        nodes: Whether each node is marked, shape (n,).
+    """
     return nodes[cells].any(axis=1)
 
 

@@ -55,7 +55,11 @@ NOTHING = ForceArrays(
 
 
 def no_interface(steps: int) -> Interface:
-    """Return an empty coupling interface for a number of steps."""
+    """Return a coupling interface without nodes, for the compiled steps of a model that is not coupled.
+
+    Args:
+        steps: Number of steps taken in one call.
+    """
     return Interface(NODES, NODES, _none_of(0, 3), _none_of(steps, 3), _none_of(steps + 1, 2), _none_of(2, 0, 3))
 
 
@@ -145,6 +149,10 @@ class CompiledSteps:
 
 
 def acts_at_nodes(load: Load) -> bool:
-    """Return whether a load does more in a step than accelerate all masses."""
+    """Return whether a load does more in a step than accelerate all masses, such as adding nodal forces.
+
+    Args:
+        load: Load of a model.
+    """
     kind = type(load)
     return any(getattr(kind, name) is not getattr(Load, name) for name in ("drive", "add", "collect"))

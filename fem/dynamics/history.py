@@ -71,7 +71,11 @@ class History:
             self._rows.append({"time": time, **signals, **self._watch.row(total, most), **energies})
 
     def check(self, participants: Mapping[Role, Participant]) -> dict[str, float]:
-        """Check the energies without adding a sample, and return them [J]; collective; raises as ``sample``."""
+        """Check the energies without adding a sample, and return them [J]; collective.
+
+        Raises:
+            EnergyError: The energy balance is violated; on every rank.
+        """
         parts = [energy_sums(participant, SIDE[role]) for role, participant in participants.items()]
         time = next(iter(participants.values())).motion.time
         return self.balance.judge(self._combine(np.sum(parts, axis=0)), time)

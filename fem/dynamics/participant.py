@@ -102,5 +102,11 @@ class SingleModel(Restartable):
 
 
 def explicit_motion(body: Body, loads: list[Load], step: float) -> ExplicitMotion:
-    """Return the explicit motion of a model without an interface, starting at rest, with a time step [s]."""
+    """Return the explicit motion (central differences) of a model without an interface, starting at rest.
+
+    Args:
+        body: Model on this rank.
+        loads: Loads and damping of the model; may be empty.
+        step: Time step [s].
+    """
     return ExplicitMotion(body, loads, step, np.empty(0, np.int32), np.zeros(len(body.mass)))

@@ -103,7 +103,9 @@ def critical_steps(
     nodal_volume: NDArray[np.float64],
     stiffness: Callable[[Elements], NDArray[np.float64]] = element_stiffness,
 ) -> NDArray[np.float64]:
-    """Return the critical time step of each single element, 2 / omega_max of M_e^-1 K_e, shape (ne,) [s].
+    """Return the critical step of central differences of each single element, shape (ne,) [s].
+
+    It is 2 / omega_max, with omega_max^2 the largest eigenvalue of M_e^-1 K_e.
 
     Their minimum bounds the critical step of an assembled model from below (Irons' bound), also with tied nodes, whose
     weights are not negative. Elements of equal shape and material are computed once.

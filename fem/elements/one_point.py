@@ -34,7 +34,7 @@ class OnePoint:
     hourglass: bool = True
 
     def geometry(self, corners: NDArray[np.float64]) -> Geometry:
-        """Return the integrals of ``IncompatibleModes``; the mean gradients are exact volume averages."""
+        """Return nodal volumes and exact mean gradients of elements with nodes at ``corners (ne, 8, 3)`` [m]."""
         return HEXAHEDRON.geometry(corners)
 
     def stiffness(

@@ -91,6 +91,10 @@ def called_for(ratio: float, cooled: bool) -> tuple[Kinematics, str]:
         ratio: Deflection of the board over its thickness.
         cooled: Whether the shock begins with residual stress, which requires path-dependent elements at finite
             rotations.
+
+    Returns:
+        "small" if stretching of the board changes deflections by a negligible amount; otherwise "finite" with residual
+        stress and "corotational" without it.
     """
     bound = stiffened(ratio, STIFFENING_BOUND)
     turns = bound > NEGLIGIBLE_STIFFENING
@@ -322,6 +326,14 @@ DROP_EFFECTS: tuple[DropEffect | MaterialEffect, ...] = (
 
 
 def reported_effects(run: DropRun) -> dict[str, Decision]:
-    """Return the decisions on all effects of a completed run by name; gravity has its short name."""
+    """Return the decisions on all effects of a completed drop by name; effects without a decision are left out.
+
+    Args:
+        run: Shock, materials and measures of the run.
+
+    Returns:
+        Effect name -> whether it is on, the reason as text and, if known, its relative influence on the result;
+        ``gravity_in_the_shock`` is called ``gravity``.
+    """
     decisions = {effect.name.removesuffix("_in_the_shock"): effect.report(run) for effect in DROP_EFFECTS}
     return {name: decision for name, decision in decisions.items() if decision is not None}

@@ -53,11 +53,15 @@ class WindowPlan:
 
 
 def box_critical_step(material: Material, size: NDArray[np.float64]) -> float:
-    """Return the critical time step [s] of a box element with edges ``size (3,)`` [m] along the material's axes.
+    """Return the critical time step [s] of a box element.
 
     With lumped mass the modes with the highest frequency are the uniform strains: omega^2 is the largest eigenvalue of
     4 C_ij / (density h_i h_j) for the normal strains, and 4 G_ij (1/h_i^2 + 1/h_j^2) / density for shear. Incompatible
     modes lower the bending frequencies below both.
+
+    Args:
+        material: Material with its elastic constants and density.
+        size: Edge lengths h along the material's axes, shape (3,) [m].
     """
     return _box_critical_step(material, tuple(map(float, size)))
 
@@ -108,6 +112,8 @@ def damped_critical_step(critical: Step, stiffness: float) -> Step:
 def window_plan(macro_step: float, meso_step: float, fraction: float, duration: float, samples: int) -> WindowPlan:
     """Choose window and substeps from critical steps, with samples at times that do not depend on the steps.
 
+    A window is the time between two exchanges of macro and meso model, and the step of the macro model.
+
     Args:
         macro_step: Smallest critical step of macro elements and of elements at the interface [s].
         meso_step: Smallest critical step of meso elements [s].
@@ -125,13 +131,23 @@ def window_plan(macro_step: float, meso_step: float, fraction: float, duration: 
 
 
 def implicit_plan(plan: WindowPlan, largest: float) -> WindowPlan:
-    """Return a plan whose windows end at the samples of another one, with implicit steps of at most ``largest`` [s]."""
+    """Return a plan with one window from each history sample of another plan to the next, divided into implicit steps.
+
+    Args:
+        plan: Plan of a run whose sample times are kept.
+        largest: Largest implicit step [s].
+    """
     spacing = plan.stride * plan.window
     return WindowPlan(spacing, math.ceil(spacing / largest), plan.windows // plan.stride, 1)
 
 
 def shorten_plan(plan: WindowPlan, duration: float) -> WindowPlan:
-    """Return a plan cut after the first sample at or after a duration [s]."""
+    """Return a plan cut after the first sample at or after a duration.
+
+    Args:
+        plan: Plan with windows and windows per sample.
+        duration: New simulated time [s].
+    """
     samples = math.ceil(duration / (plan.stride * plan.window) * (1.0 - ROUNDING))
     return replace(plan, windows=min(plan.windows, plan.stride * samples))
 

@@ -101,11 +101,20 @@ MATERIAL_EFFECTS: tuple[MaterialEffect, ...] = (Plasticity(), *OF_YIELD_STRESS)
 
 
 def plastic_laws(materials: Mapping[str, Material]) -> dict[str, JohnsonCook]:
-    """Return the Johnson-Cook parameters of the plastic materials by name."""
+    """Return the Johnson-Cook parameters of the plastic materials by name; empty if all materials are elastic.
+
+    Args:
+        materials: Materials by role or part name, which becomes the key of the result.
+    """
     return {name: material.plasticity for name, material in materials.items() if material.plasticity is not None}
 
 
 def yields(name: str, law: JohnsonCook) -> str:
-    """Return a sentence on the yield stress and the hardening of the material ``name`` with a Johnson-Cook law."""
+    """Return a sentence on the yield stress and the hardening of a material.
+
+    Args:
+        name: Name of the material in the sentence.
+        law: Johnson-Cook parameters: yield stress A, hardening B p^n with plastic strain p.
+    """
     hardening = f", hardening {1e-6 * law.B:g} MPa p^{law.n:g}" if law.B > 0.0 else ", no hardening"
     return f"{name} yields from {1e-6 * law.A:g} MPa on{hardening}"

@@ -76,12 +76,22 @@ class Alternative:
 
 
 def shared(roles: Sequence[Role], size: int) -> Placement:
-    """Return the placement of all models (``macro``, ``meso`` or ``dns``) on all of ``size`` ranks."""
+    """Return the placement of all models on all ranks, which compute them in turn.
+
+    Args:
+        roles: Models (``macro``, ``meso`` or ``dns``) in the order in which a rank computes them.
+        size: Number of ranks.
+    """
     return Placement(dict.fromkeys(roles, tuple(range(size))))
 
 
 def disjoint(macro: Sequence[int], size: int) -> Placement:
-    """Return the placement with the macro model on the ranks ``macro`` of ``size``, the meso model on all others."""
+    """Return the placement with the macro model on some ranks and the meso model on all others.
+
+    Args:
+        macro: Ranks of the macro model, from 0.
+        size: Number of all ranks.
+    """
     others = tuple(rank for rank in range(size) if rank not in macro)
     return Placement({"macro": tuple(sorted(macro)), "meso": others})
 
@@ -119,7 +129,12 @@ def alternatives(ranks: Ranks, speeds: Sequence[float], cost: WindowCost) -> lis
 
 
 def least_seconds(ranks: Ranks, cost: WindowCost) -> float:
-    """Return the predicted time of a window of the fastest placement on ranks of speed one [s]."""
+    """Return the predicted time of a window (between two exchanges of the models) in the fastest placement [s].
+
+    Args:
+        ranks: Number of ranks, all of speed one, and allowed placements.
+        cost: Cost of the window for both models.
+    """
     size, seconds = ranks.total, []
     if ranks.placement != "disjoint":
         macro, meso = (model_seconds(model, size, size > 1, cost.latency) for model in (cost.macro, cost.meso))
@@ -135,7 +150,13 @@ def least_seconds(ranks: Ranks, cost: WindowCost) -> float:
 def window_seconds(placement: Placement, speeds: Sequence[float], cost: WindowCost) -> float:
     """Return the predicted time of a window [s]: work over the speeds of its ranks, plus messages.
 
-    Ranks with both models compute them in turn; ranks with one model wait for the slower model.
+    A window is the time between two exchanges of the models. Ranks with both models compute them in turn; ranks with
+    one model wait for the slower model.
+
+    Args:
+        placement: Ranks of each model.
+        speeds: Relative speed of each rank, 1 for the reference.
+        cost: Cost of the window for both models.
     """
     power = {role: sum(speeds[rank] for rank in ranks) for role, ranks in placement.ranks.items()}
     several = {role: len(ranks) > 1 for role, ranks in placement.ranks.items()}
@@ -165,6 +186,10 @@ def model_seconds(cost: ModelCost, speed: float, several: bool, latency: float) 
 
 def check_size(ranks: Ranks, size: int) -> None:
     """Check that the number of MPI ranks equals ``ranks.total`` of the input.
+
+    Args:
+        ranks: Rank settings of the input.
+        size: Number of MPI ranks of the run.
 
     Raises:
         RankError: The numbers differ.

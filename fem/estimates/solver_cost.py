@@ -97,13 +97,17 @@ class SolverForecast:
 def forecast_solvers(
     problem: StructureProblem, elements: int, explicit_steps: int, implicit_steps: int
 ) -> SolverForecast:
-    """Predict the cost of both solvers on one core.
+    """Predict the cost of the explicit and of the implicit solver on one core.
 
     Args:
         problem: Parameters of the structure.
         elements: Number of elements of the mesh.
         explicit_steps: Steps of the explicit solver.
         implicit_steps: Steps of the implicit solver, see ``implicit_step``.
+
+    Returns:
+        Number of steps, times [s] and memory [B] of each solver, and the nonlinearities that only the explicit solver
+        supports.
     """
     nodes = _node_counts(problem)
     reasons = _nonlinearities(problem)
@@ -148,7 +152,11 @@ def cooling_cost(elements: int, yielding: int) -> SolverCost:
 
 
 def plate_nodes(elements: int) -> tuple[int, int, int]:
-    """Return the number of nodes along x, y, z of a square plate with a number of hexahedra, as a model of a board."""
+    """Return the number of nodes along x, y, z of a square plate, as a model of a board.
+
+    Args:
+        elements: Approximate number of hexahedra of the plate.
+    """
     side = max(1, round(math.sqrt(elements / PLATE_LAYERS)))
     return side + 1, side + 1, PLATE_LAYERS + 1
 
@@ -170,7 +178,12 @@ def _nonlinearities(problem: StructureProblem) -> tuple[str, ...]:
 
 
 def implicit_step(dynamics: Dynamics, pulses: Iterable[float]) -> float:
-    """Return the largest implicit step [s] from the case or, by default, by ``estimate.largest_implicit_step``."""
+    """Return the largest implicit step [s]: that of the case file, or by default ``estimate.largest_implicit_step``.
+
+    Args:
+        dynamics: Settings of the dynamics, with duration [s] and, optionally, the step.
+        pulses: Durations of the load pulses [s]; may be empty.
+    """
     return dynamics.numerics.implicit_step or largest_implicit_step(dynamics.duration, pulses)
 
 

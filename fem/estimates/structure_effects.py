@@ -113,5 +113,14 @@ STRUCTURE_EFFECTS: tuple[Effect[MotionScene] | MaterialEffect, ...] = (
 
 
 def effects(problem: StructureProblem, added_mass: float, neglected_strain: float | None = None) -> dict[str, Decision]:
-    """Decide on the effects of a structure; arguments as the attributes of ``MotionScene``."""
+    """Decide on the effects of a structure, before or after a run.
+
+    Args:
+        problem: Parameters of the structure and its motion.
+        added_mass: Mass added by mass scaling [kg].
+        neglected_strain: Largest strain neglected by the kinematics of a run; None before a run.
+
+    Returns:
+        Effect name -> whether it is on, the reason as text and, if known, its relative influence on the result.
+    """
     return decide_all(STRUCTURE_EFFECTS, MotionScene(problem, added_mass, neglected_strain))

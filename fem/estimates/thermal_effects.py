@@ -83,10 +83,15 @@ def _rigidity(lower: PlateLayer, upper: PlateLayer) -> float:
 
 
 def warpage_number(thermal: Thermal, materials: Mapping[str, Material], sizes: PackageSizes) -> float:
-    """Return the larger of bow over standoff and shift of pads over their radius by heating.
+    """Return the larger of bow over standoff and shift of pads over their radius by heating, dimensionless.
 
     Both are differences between the centre and the outermost joint: the bow of a package that is covered by the die,
     and the mismatch of thermal expansion between package (bonded layers) and board.
+
+    Args:
+        thermal: Temperature profile; the rise is from ``reference`` to ``peak``.
+        materials: Materials by role (board, substrate, die).
+        sizes: Dimensions of package and board.
     """
     rise = thermal.peak - thermal.reference
     lower, upper = PlateLayer.of(materials["substrate"], sizes.substrate), PlateLayer.of(materials["die"], sizes.die)

@@ -35,14 +35,14 @@ class Energy:
 
 
 class InternalForce(Protocol):
-    """Object that subtracts an internal force; see ``force.ForceTerm``."""
+    """Object that subtracts an internal force, such as a ``force.ForceTerm``."""
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
         """Subtract the internal force ``(n, 3)`` [N] at a displacement ``(n, 3)`` [m]."""
 
 
 def linear_energy(term: InternalForce, displacement: NDArray[np.float64], mean: MeanStrain | None) -> Energy:
-    """Return the energy u . K u / 2 of a linear force term on this rank [J].
+    """Return the strain and hourglass energy of a linear force term on this rank, together u . K u / 2 [J].
 
     Args:
         term: Force term with a linear internal force K u.

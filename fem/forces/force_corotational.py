@@ -162,7 +162,11 @@ class TurningBlocks:
         return cls(elements.points, cells, filled, by_block, elements.kind.hourglass, chosen)
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
-        """Subtract the internal force; arguments and errors as ``CorotationalBoxes.add``."""
+        """Subtract the internal force at a displacement ``(n, 3)`` [m] from ``force (n, 3)`` [N].
+
+        Raises:
+            InvertedElementError: An element is turned inside out.
+        """
         block = self.forces(self.cells, self.filled, self.constants, displacement, force)
         if block != UPRIGHT:
             raise self.inverted(block, displacement)

@@ -180,7 +180,7 @@ class NonlinearElements:
         return np.linalg.det(symmetric(stretch.reshape(-1, 6))).reshape(stretch.shape[:-1])
 
     def means(self, indices: NDArray[np.integer]) -> "Means":
-        """Return the volume average of each of some elements; ``indices (k,)`` as in ``located``."""
+        """Return volume averages of stress and plastic strain in elements with ``indices (k,)`` into ``elements``."""
         values = self.points(*self.located(indices))
         share = values.weight / values.weight.sum(axis=1)[:, None]
         stress = np.einsum("km,kmc->kc", share, values.stress)

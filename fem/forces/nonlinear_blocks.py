@@ -96,7 +96,7 @@ def merge_equal_materials(elements: Elements, plastic: NDArray[np.float64]) -> t
 
     Args:
         elements: Elements with an elasticity for each of nm materials.
-        plastic: Constants of ``materials.plasticity.plastic_constants`` of each material, shape (nm, 6).
+        plastic: 3 G, A, B [Pa], n, C and reference rate [1/s] of each material (Johnson and Cook), shape (nm, 6).
 
     Returns:
         Elements and plastic constants, shape (nd, 6), of the nd distinct materials.
@@ -113,7 +113,7 @@ def gradient_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float6
     Args:
         elements: Tetrahedra with 4 or 10 nodes.
         lanes: Their order, from ``arrange``.
-        plastic: Constants of ``materials.plasticity.plastic_constants`` of each material, shape (nm, 6).
+        plastic: 3 G, A, B [Pa], n, C and reference rate [1/s] of each material (Johnson and Cook), shape (nm, 6).
         finite: Whether kinematics are finite (the state then holds stretches) instead of small.
     """
     corners, kind = elements.points[elements.cells[lanes.shape]], elements.kind
@@ -135,7 +135,7 @@ def one_point_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float
     Args:
         elements: Hexahedra of the one-point formulation.
         lanes: Their order, from ``arrange``.
-        plastic: Constants of ``materials.plasticity.plastic_constants`` of each material, shape (nm, 6).
+        plastic: 3 G, A, B [Pa], n, C and reference rate [1/s] of each material (Johnson and Cook), shape (nm, 6).
         finite: Whether kinematics are finite (the state then holds stretches) instead of small.
     """
     shapes = elements.subset(lanes.shape)
@@ -196,7 +196,7 @@ def hexahedron_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.floa
     Args:
         elements: Hexahedra with incompatible modes.
         lanes: Their order, from ``arrange``.
-        plastic: Constants of ``materials.plasticity.plastic_constants`` of each material, shape (nm, 6).
+        plastic: 3 G, A, B [Pa], n, C and reference rate [1/s] of each material (Johnson and Cook), shape (nm, 6).
     """
     corners = elements.points[elements.cells[lanes.shape]]
     count = len(corners)

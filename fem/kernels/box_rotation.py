@@ -8,12 +8,11 @@ Q^ = H q^ and M = T U,
     P = R (T - [w]x),    (tr(U) 1 - U) w = axial(M - M^T) + sum over k of q^_k x Q^_k
 
 is the force on F and R Q^_k the force on q_k; [w]x is the matrix of the cross product. It arises because a change of F
-rotates the frame by omega, (tr(U) 1 - U) omega = axial(R^T dF - dF^T R). Energy, linear and angular momentum are
-conserved.
+rotates the frame by omega, (tr(U) 1 - U) omega = axial(R^T dF - dF^T R). Energy and momenta are conserved.
 
 Rows, lines and faces are defined in ``kernels.box_rows``, modes in ``force_congruent``. Sixteen boxes of a row, or
-sixteen boxes of any shapes, are computed side by side as in ``kernels.lanes``. Slots of the workspace ``w``, in units
-of lanes: component c of the mode of parity p at 3 p + c, then F and R as in ``kernels.nonlinear.rotate``.
+sixteen boxes of any shapes, are computed side by side as in ``kernels.lanes``. The workspace ``w`` has
+component c of mode p of box e at 16 (3 p + c) + e, then entries i of F at 384 + 16 i + e and of R at 528 + 16 i + e.
 """
 
 import numpy as np
@@ -49,9 +48,9 @@ def read_modes(faces, start, w):
     """Write the modes of the boxes ``start`` to ``start + 15`` of a row from the face values at its nodes.
 
     Args:
-        faces: Face values of three components [m], see ``box_rows.transform_lines``, shape (12 * WIDTH,).
+        faces: Component c of face parity k at node i at ``(4 c + k) WIDTH + FIRST + i``, shape (12 WIDTH,) [m].
         start: First of the sixteen boxes in the row.
-        w: Flat workspace of ``TURNED_SLOTS`` entries; its first 384 entries are written.
+        w: Workspace (672,); writes component c of mode p (bit d: odd along d) of box e to ``16 (3 p + c) + e`` [m].
     """
     for k in range(4):
         values, modes = faces[k * WIDTH + FIRST + start :], w[6 * LANES * k :]
@@ -68,10 +67,10 @@ def add_faces(w, start, count, faces):
     """Add the forces on the modes of boxes of a row to the face values at its nodes, the transpose of ``read_modes``.
 
     Args:
-        w: Flat workspace with the forces [N] on the modes of sixteen boxes.
-        start: First of these boxes in the row.
+        w: Workspace (672,); force on component c of mode p (bit d: odd along d) of box e at ``16 (3 p + c) + e`` [N].
+        start: First of the sixteen boxes in the row.
         count: Number of these boxes that are added; the others repeat the last box of the row.
-        faces: Face forces of three components, shape (12 * WIDTH,) [N], added to.
+        faces: Component c of face parity k at node i at ``(4 c + k) WIDTH + FIRST + i``, (12 WIDTH,) [N], added to.
     """
     for k in range(4):
         values, modes = faces[k * WIDTH + FIRST + start :], w[6 * LANES * k :]
@@ -91,8 +90,7 @@ def add_faces(w, start, count, faces):
 def transform_corners(w):
     """Replace the values at eight corners of sixteen elements by their Walsh-Hadamard transform, in place.
 
-    Args:
-        w: Flat array; component c at corner a of element e at ``16 * (3 a + c) + e`` becomes that of parity a.
+    ``w (>= 384,)``: component c of corner a of element e, then of mode a (bit d: odd along d), at ``16 (3 a + c) + e``.
     """
     for component in range(3):
         v = w[LANES * component :]
@@ -108,11 +106,9 @@ def transform_corners(w):
 
 @njit(**LANE_OPTIONS)
 def write_deformation(k, w):
-    """Write the mean deformation gradients F of sixteen boxes.
+    """Write the mean deformation gradients F of sixteen boxes; ``k (480,)`` from ``spread_shape`` scales modes to F.
 
-    Args:
-        k: Constants as in ``spread_shape``; reads the scales -1 / (4 h) [1/m], which convert modes to gradients.
-        w: Flat workspace; reads the modes [m], writes F at ``DEFORMATION``.
+    ``w (672,)``: reads component c of mode p of box e at ``16 (3 p + c) + e`` [m], writes F at ``384 + 16 i + e``.
     """
     for lane in range(LANES):
         scale, x, y, z = three(k, SCALE + lane), three(w, X + lane), three(w, Y + lane), three(w, Z + lane)
@@ -128,9 +124,8 @@ def write_deformation(k, w):
 def stress(k, u):
     """Return the stress times volume T = V C : (U - 1) as six scalars xx, yy, zz, xy, yz, xz [J].
 
-    Args:
-        k: At least nine scalars: V times C_xx, C_yy, C_zz, C_xy, C_yz, C_xz, G_xy, G_yz, G_xz [J].
-        u: Stretch U, six scalars.
+    ``u``: U, six scalars in this order; ``k``: nine scalars or more, V times C_xx, C_yy, C_zz, C_xy, C_yz, C_xz, G_xy,
+    G_yz, G_xz [J].
     """
     x, y, z = u[0] - 1.0, u[1] - 1.0, u[2] - 1.0
     return (
@@ -159,17 +154,13 @@ def resistance(k, a, b, c, d):
 
 @njit(**LANE_OPTIONS)
 def add_cross(m, a, b):
-    """Return m + a x b of three vectors as three scalars."""
-    return (
-        m[0] + a[1] * b[2] - a[2] * b[1],
-        m[1] + a[2] * b[0] - a[0] * b[2],
-        m[2] + a[0] * b[1] - a[1] * b[0],
-    )
+    """Return m + a x b of the vectors m, a and b; all are three scalars."""
+    return m[0] + a[1] * b[2] - a[2] * b[1], m[1] + a[2] * b[0] - a[0] * b[2], m[2] + a[0] * b[1] - a[1] * b[0]
 
 
 @njit(**LANE_OPTIONS)
 def spin(u, moment):
-    """Return the vector w that solves (tr(U) 1 - U) w = moment, three scalars; ``u`` is U as xx, yy, zz, xy, yz, xz."""
+    """Return w, three scalars, with (tr(U) 1 - U) w = ``moment``, three scalars; ``u`` is U: xx, yy, zz, xy, yz, xz."""
     t = u[1] + u[2], u[0] + u[2], u[0] + u[1], -u[3], -u[4], -u[5]
     c = cofactor_symmetric(t)
     s = 1.0 / (t[0] * c[0] + t[3] * c[3] + t[5] * c[5])
@@ -178,11 +169,9 @@ def spin(u, moment):
 
 @njit(**LANE_OPTIONS)
 def resist(k, w):
-    """Replace the higher modes of sixteen boxes by the forces Q^ [N], and write their moments q^ x Q^ to mode 0.
+    """Replace the modes xy, xz, yz, xyz of sixteen boxes by the forces on them [N]; write their moments [J] to mode 0.
 
-    Args:
-        k: Constants as in ``spread_shape``.
-        w: Flat workspace with modes and R.
+    ``w (672,)``: p = 3, 5, 6, 7 of box e at ``16 (3 p + c) + e``, R at ``528 + 16 i + e``; ``k`` from ``spread_shape``.
     """
     for lane in range(LANES):
         back = transposed(nine(w, ROTATION + lane))
@@ -199,7 +188,10 @@ def resist(k, w):
 
 @njit(**LANE_OPTIONS)
 def write_stress(k, w):
-    """Replace F of sixteen boxes in workspace ``w`` by P [J], given R and the moments; ``k`` as in ``resist``."""
+    """Replace the deformation gradients F of sixteen boxes by forces P [J] on them; ``k (480,)`` from ``spread_shape``.
+
+    ``w (672,)``: F, then P, of box e by rows at ``384 + 16 i + e``, R at ``528 + 16 i + e``, moments at ``16 c + e``.
+    """
     for lane in range(LANES):
         r, higher = nine(w, ROTATION + lane), three(w, lane)
         u = stretch(r, nine(w, DEFORMATION + lane))
@@ -212,7 +204,10 @@ def write_stress(k, w):
 
 @njit(**LANE_OPTIONS)
 def write_linear_forces(k, w):
-    """Write the forces [N] on constant and linear modes of 16 boxes, given P [J] in ``w``; ``k`` as in ``resist``."""
+    """Write the forces [N] on constant and linear modes of sixteen boxes; ``k (480,)`` from ``spread_shape``.
+
+    ``w (672,)``: reads P at ``384 + 16 i + e`` [J], writes modes p = 0 (zero), 1, 2, 4 to ``16 (3 p + c) + e``.
+    """
     for lane in range(LANES):
         p, scale = nine(w, DEFORMATION + lane), three(k, SCALE + lane)
         put_three(w, lane, (0.0, 0.0, 0.0))
@@ -223,7 +218,10 @@ def write_linear_forces(k, w):
 
 @njit(**LANE_OPTIONS)
 def turn_higher(w):
-    """Rotate the forces Q^ on the higher modes of sixteen boxes in workspace ``w`` by R, in place."""
+    """Rotate the forces [N] on the modes xy, xz, yz, xyz of sixteen boxes by their rotations R, in place.
+
+    ``w (672,)``: component c for p = 3, 5, 6, 7 of box e at ``16 (3 p + c) + e``, R row by row at ``528 + 16 i + e``.
+    """
     for lane in range(LANES):
         r = nine(w, ROTATION + lane)
         put_three(w, XY + lane, applied(r, three(w, XY + lane)))
@@ -234,10 +232,10 @@ def turn_higher(w):
 
 @njit(cache=True)
 def replace_by_forces(k, w):
-    """Replace the modes [m] of sixteen boxes in workspace ``w`` by the forces on them [N], given F and R.
+    """Replace the modes [m] of sixteen boxes by the forces on them [N]; ``k (480,)`` from ``spread_shape``.
 
-    The loops are short and unrolled: with too many accesses, or calls too large to be inlined, the compiler does not
-    vectorise them, and the force takes three times as long. ``k`` as in ``spread_shape``.
+    ``w (672,)``: mode p of box e at ``16 (3 p + c) + e``, F at ``384 + 16 i + e``, R at ``528 + 16 i + e``.
+    The loops are short and unrolled: otherwise the compiler does not vectorise them, which triples the time.
     """
     resist(k, w)
     write_stress(k, w)
@@ -247,18 +245,16 @@ def replace_by_forces(k, w):
 
 @njit(**LANE_OPTIONS)
 def own_constants(k, lane):
-    """Return the 27 constants of one of sixteen boxes as scalars; ``k`` as in ``spread_shape``, ``lane`` 0 to 15."""
+    """Return the 27 constants [J, N/m] of box ``lane`` (0 to 15), scalars ``k[16 i + lane]``; ``k``: shape (480,)."""
     return nine(k, lane) + nine(k, 9 * LANES + lane) + nine(k, 18 * LANES + lane)
 
 
 @njit(cache=True)
 def spread_shape(constants, scale, k):
-    """Copy the constants of one shape to sixteen boxes.
+    """Copy the constants of one shape to sixteen boxes, entry i of box e at ``k[16 i + e]``, shape (480,).
 
-    Args:
-        constants: Constants of ``force_corotational.box_constants``, shape (27,) [J, N/m].
-        scale: -1 / (4 h) along each direction, shape (3,) [1/m].
-        k: Written: constants, scales; entry i of box e at ``16 * i + e``, shape (480,).
+    ``constants (27,)`` of ``force_corotational.box_constants`` [J, N/m] come first, then ``scale (3,)``, the values
+    -1 / (4 h) along each direction [1/m] with the edge lengths h.
     """
     for i in range(27):
         k[LANES * i : LANES * (i + 1)] = constants[i]
@@ -268,12 +264,10 @@ def spread_shape(constants, scale, k):
 
 @njit(cache=True)
 def box_energies(w, lane, k):
-    """Return the energies of the mean strain and of the higher modes of one box, two scalars [J].
+    """Return the energies of the mean strain and of the higher modes of box ``lane`` (0 to 15), two scalars [J].
 
-    Args:
-        w: Flat workspace with modes, F and R of sixteen boxes.
-        lane: Number of the box, 0 to 15.
-        k: Its 27 constants, see ``own_constants``.
+    ``w (672,)``: component c of mode p at ``16 (3 p + c) + lane`` [m], F at ``384 + 16 i + lane``, R at ``528 + 16 i +
+    lane``; ``k``: 27 constants of the box, scalars of ``own_constants``.
     """
     higher, r = 0.0, nine(w, ROTATION + lane)
     u, back = stretch(r, nine(w, DEFORMATION + lane)), transposed(r)
@@ -290,7 +284,7 @@ def box_energies(w, lane, k):
 
 @njit(cache=True)
 def repeat_last(w, count):
-    """Copy the modes of box ``count - 1`` in workspace ``w`` to all following boxes of the sixteen."""
+    """Copy all modes of box ``count - 1`` (slots s < 24: ``w[16 s + count - 1]``) to the following boxes of sixteen."""
     for slot in range(0, DEFORMATION, LANES):
         for lane in range(count, LANES):
             w[slot + lane] = w[slot + count - 1]
@@ -301,9 +295,9 @@ def add_turned_row_forces(rows, scales, constants, displacement, force):
     """Add the internal force of rows of equal corotational boxes; the caller subtracts it.
 
     Args:
-        rows: ``(nr, 6)`` int32 as in ``kernels.box_rows.add_row_forces``.
-        scales: ``(ns, 3)`` [1/m] per shape, -1 / (4 h) along each direction.
-        constants: ``(ns, 27)`` per shape, see ``force_corotational.box_constants``.
+        rows: Positions where the four lines of a row begin, number of boxes, shape index; shape (nr, 6) int32.
+        scales: -1 / (4 h) of each shape along each direction, h edge lengths, shape (ns, 3) [1/m].
+        constants: Constants of each shape, see ``force_corotational.box_constants``, shape (ns, 27) [J, N/m].
         displacement: Displacement at the positions of the lines, shape (3, >= p + PAD) [m].
         force: Force at the positions, shape (3, >= p + PAD) [N], added to.
 
@@ -333,7 +327,11 @@ def add_turned_row_forces(rows, scales, constants, displacement, force):
 
 @njit(cache=True)
 def row_energies(rows, scales, constants, displacement):
-    """Return total energies of mean strains and higher modes [J]; arguments as in ``add_turned_row_forces``."""
+    """Return the total energies of mean strains and of higher modes of rows of boxes, two scalars [J].
+
+    ``rows (nr, 6)``: positions where four lines begin, number of boxes, shape; ``scales (ns, 3)``: -1 / (4 h) [1/m];
+    ``constants (ns, 27)``: of ``box_constants``; ``displacement (3, >= p + PAD)``: component by position in lines [m].
+    """
     faces, w, k = np.zeros((3, 4, WIDTH)), np.zeros(TURNED_SLOTS), np.empty(SCALE + 3 * LANES)
     mean = higher = 0.0
     for r in range(len(rows)):
@@ -358,10 +356,9 @@ def add_turned_block_forces(cells, filled, constants, displacement, force):
     """Subtract the internal force of corotational boxes of any shapes.
 
     Args:
-        cells: ``(nb, 8, 16)`` int32 nodes of blocks of 16 boxes; bit d of a corner's number is its side in direction d;
-            boxes after the last one repeat it.
-        filled: ``(nb,)`` int32 number of boxes of each block.
-        constants: ``(nb, 480)``, each block as ``k`` of ``spread_shape``.
+        cells: Nodes of blocks of 16 boxes in tensor order, boxes after the last one repeat it, shape (nb, 8, 16) int32.
+        filled: Number of boxes of each block, shape (nb,) int32.
+        constants: 27 box constants and three scales, entry i of box e at ``16 i + e``, shape (nb, 480) [J, N/m, 1/m].
         displacement: Nodal displacement, shape (n, 3) [m].
         force: Nodal force, shape (n, 3) [N], subtracted from.
 
@@ -383,7 +380,11 @@ def add_turned_block_forces(cells, filled, constants, displacement, force):
 
 @njit(cache=True)
 def block_energies(cells, filled, constants, displacement):
-    """Return total energies of mean strains and higher modes [J]; arguments as in ``add_turned_block_forces``."""
+    """Return the total energies of mean strains and of higher modes of boxes in blocks, two scalars [J].
+
+    ``cells (nb, 8, 16)``: nodes; ``filled (nb,)``: boxes of each block; ``constants (nb, 480)``: 27 + 3 scales,
+    entry i of box e at ``16 i + e``; ``displacement (n, 3)``: nodal [m].
+    """
     w = np.zeros(TURNED_SLOTS)
     mean = higher = 0.0
     for b in range(len(cells)):

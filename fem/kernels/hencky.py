@@ -287,7 +287,7 @@ def hourglass_share(points, stress, laws, share):
     Args:
         points: Stress xx, yy, zz, xy, yz, xz [Pa] and equivalent plastic strain at the centres, shape (ne, 1, 7).
         stress: Magnitude of the elastic hourglass stress, shape (ne,) [Pa].
-        laws: Plastic constants of each element, shape (ne, 6), see ``materials.plasticity.plastic_constants``.
+        laws: Plastic constants 3 G, A, B [Pa], n, C, reference rate [1/s] of each element, shape (ne, 6).
         share: Written: fraction between 0 and 1, shape (ne,); 1 where the section is elastic.
     """
     for e in range(len(stress)):

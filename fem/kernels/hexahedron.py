@@ -93,7 +93,7 @@ def write_strain_columns(strain, column, gx, gy, gz):
 
 @njit(cache=True)
 def condense(full, kept):
-    """Condense a symmetric matrix to its first unknowns in place (Schur complement by Gaussian elimination).
+    """Eliminate all but the first unknowns of a symmetric matrix in place (Schur complement).
 
     Args:
         full: Matrix, shape (n, n); on return its upper left block of shape (kept, kept) is the result, the other

@@ -1,7 +1,6 @@
 """Numba kernels that take all steps of a window, or all substeps of step levels inside a step, in one call.
 
-Step levels are described in ``fem.model.step_levels``; the state of a level, shape (3, n, 3), holds displacement [m],
-force [N] and weighted sum of forces [N].
+Step levels are described in ``fem.model.step_levels``.
 """
 
 from typing import NamedTuple
@@ -44,8 +43,7 @@ class ForceArrays(NamedTuple):
         turning_rows: Nodes, axes, rows, scales, constants and lines of ``box_rotation.add_turned_row_forces``.
         turning_boxes: Cells, filled and constants of ``box_rotation.add_turned_block_forces``.
         turning: Cells, filled and constants of ``turned_hexahedron.add_turned_forces``.
-        one_point, hexahedron: Blocks of ``nonlinear_one_point`` and ``nonlinear_hexahedron``.
-        path: Kinematics and time step of these blocks.
+        one_point, hexahedron, path: Blocks of ``nonlinear_one_point`` and ``nonlinear_hexahedron``, and their ``Path``.
     """
 
     congruent: tuple[NDArray, ...]
@@ -87,13 +85,13 @@ structref.define_proxy(PacedForces, PacedForcesType, ["arrays", "every"])
 
 @njit(cache=True)
 def forces_of(arrays):
-    """Return the ``Forces`` of ``ForceArrays``: the class itself, called by the interpreter, is compiled every time."""
+    """Return ``Forces`` from ``ForceArrays`` (kernel arguments of force terms); compiled once, unlike its class."""
     return Forces(*arrays)
 
 
 @njit(cache=True)
 def paced_forces_of(arrays, every):
-    """Return ``PacedForces``; ``arrays``: ``PACES`` ``Forces``; ``every``: interval of each pace in steps, (PACES,)."""
+    """Return ``PacedForces``; ``arrays``: tuple of three ``Forces``; ``every (3,)``: intervals in steps, 0: unused."""
     return PacedForces(arrays, every)
 
 
@@ -105,8 +103,7 @@ class StepArrays(NamedTuple):
         ahead: Force for the following steps, see ``ExplicitMotion``, shape (n, 3) or (0, 3) [N].
         mobility: Inverse mass, zero where the velocity is prescribed, shape (n, 3) [1/kg].
         counted_mass: Nodal mass in the energy balance, shape (n,) [kg].
-        slave, master, weight: Slaves, masters and weights of the tie, see ``fem.mesh.tie``; slaves of elements that act
-            most often come first.
+        slave, master, weight: Tie, see ``fem.mesh.tie``; slaves of elements that act most often come first.
         order: Number of each slave in the tie, shape (ns,).
         moved: Number of slaves of elements up to each pace, shape (PACES,).
         ends: Number of leading nodes that contains all nodes of elements up to each pace, shape (PACES,).
@@ -151,8 +148,7 @@ def add_forces(arrays, displacement, force):
     """Subtract the internal force of the terms in ``Forces`` at displacements ``(n, 3)`` [m] from ``force (n, 3)`` [N].
 
     Returns:
-        ``ALL_FINE`` (-1), or the index into ``NAMES`` of a term with an inverted element; and the element's block or
-        row.
+        ``ALL_FINE`` (-1) and 0, or, with an inverted element, index of its term into ``NAMES`` and its block or row.
     """
     nodes, axes, rows, blocks, lines = arrays.congruent
     if len(rows):
@@ -188,20 +184,18 @@ def add_forces(arrays, displacement, force):
 
 @njit(cache=True)
 def take_steps(motion, forces, interface, accelerations, step):
-    """Take m steps of central differences as ``ExplicitMotion.advance`` and ``update_force`` do; ``motion`` is updated.
-
-    The work of the steady part of the body force follows from the displacement of all masses, that of its change is
-    summed.
+    """Take m steps of central differences as ``ExplicitMotion.advance`` and ``update_force`` do.
 
     Args:
-        motion: ``StepArrays``.
+        motion: ``StepArrays`` (state, masses and tie of this rank), updated.
         forces: ``PacedForces``; all of them have just acted, and act again after the last step.
-        interface: ``Interface``, impulses added to.
-        accelerations: ``(m + 1, 3)`` [m/s^2] of the body force as each step begins, and after the last.
-        step: Time step dt [s].
+        interface: ``Interface`` to another model, without rows if uncoupled; its impulses are added to.
+        accelerations: Body acceleration as each step begins, and after the last, shape (m + 1, 3) [m/s^2].
+        step: Time step dt, scalar [s].
 
     Returns:
-        Work of the accelerations [J]; steps taken; both results of the last ``add_forces``; pace of these forces.
+        Work of the accelerations [J], for their steady part by the displacement of all masses; steps taken, m or up to
+        an inverted element; then its term (index into ``NAMES``), block or row, and pace (0 to 2), else -1, 0, 0.
     """
     displacement, velocity, force = motion.state[0], motion.state[1], motion.state[2]
     last, pushed, every = len(accelerations) - 1, np.zeros_like(motion.ahead), forces.every
@@ -241,14 +235,14 @@ def take_steps(motion, forces, interface, accelerations, step):
 
 @njit(cache=True)
 def count_impulses(interface, substep, force):
-    """Add the force ``(n, 3)`` [N] of the leading nodes after step ``substep`` to the impulses of an ``Interface``."""
+    """Add ``force (n, 3)`` [N] after step ``substep`` (0: at the start) to the impulses of an ``Interface``."""
     for j in range(2):
         add_impulse(interface.counted, force, interface.weights[substep, j], interface.impulses[j])
 
 
 @njit(cache=True)
 def acts(forces, pace, substep):
-    """Return whether the terms of a pace (index into ``PacedForces``) act after step number ``substep`` (from 1)."""
+    """Return whether the terms of pace 0 to 2 of ``PacedForces`` act after step number ``substep`` (from 1)."""
     return forces.every[pace] > 0 and substep % forces.every[pace] == 0
 
 
@@ -257,10 +251,10 @@ def move_nodes(motion, block, body, step):
     """Move a range of nodes by the steps since a force acted on them, and zero their force.
 
     Args:
-        motion: ``StepArrays``, updated.
-        block: First node, end, number of steps to take and number of the last of them (from 1).
-        body: Accelerations (m + 1, 3) as steps begin, mean deviations from the steady part (m, 3) [m/s^2].
-        step: Time step dt [s].
+        motion: ``StepArrays``, its state is updated.
+        block: Tuple: first node, end, number of steps to take and number of the last of them (from 1).
+        body: Tuple: accelerations (m + 1, 3) as steps begin, mean deviations from the steady part (m, 3) [m/s^2].
+        step: Time step dt, scalar [s].
 
     Returns:
         Work of the deviation [J].
@@ -277,7 +271,10 @@ def move_nodes(motion, block, body, step):
 
 @njit(cache=True)
 def move_interface(interface, block, velocity):
-    """Set ``velocity (n, 3)`` [m/s] to the mean of an ``Interface`` over some steps; ``block`` as in ``move_nodes``."""
+    """Set ``velocity (n, 3)`` [m/s] at nodes of an ``Interface`` to their prescribed mean velocity over some steps.
+
+    ``block``, a tuple: first node, end of the range of nodes, number of steps and number of the last of them (from 1).
+    """
     begin, end, count, substep = block
     x = y = z = 0.0
     for k in range(substep - count, substep):
@@ -293,9 +290,10 @@ def move_interface(interface, block, velocity):
 
 @njit(inline="always")
 def add_paced_forces(motion, forces, substep, pushed, final):
-    """Add the forces that act after step ``substep``, each for its interval; return as ``add_forces``, then the pace.
+    """Add the forces of ``PacedForces`` that act after step ``substep`` to ``StepArrays``, each for its interval.
 
-    The ``final`` step (bool) adds the share of later steps to ``ahead``; workspace ``pushed (n, 3)`` stays zero.
+    If ``final``, later steps' shares go to ``ahead``; workspace ``pushed (n, 3)`` stays 0. Returns three scalars: those
+    of ``add_forces`` (-1 and 0, or term and block of an inverted element) and pace (0 to 2).
     """
     force = motion.state[2]
     for pace in range(PACES):
@@ -311,7 +309,7 @@ def add_paced_forces(motion, forces, substep, pushed, final):
 
 @njit(cache=True)
 def gather_forces(motion, moved, final):
-    """Move the forces of the first ``moved`` slaves to their masters; if ``final``, store them and move ``ahead``."""
+    """Move forces of the first ``moved`` slaves of ``StepArrays`` to masters; ``final``: store them, move ``ahead``."""
     slave, master, weight = motion.slave[:moved], motion.master[:moved], motion.weight[:moved]
     force = motion.state[2]
     for i in range(moved if final else 0):
@@ -324,7 +322,7 @@ def gather_forces(motion, moved, final):
 
 @njit(cache=True)
 def begin_substeps(rows, values, state):
-    """Copy rows ``rows (n,)`` of displacements ``values (>= n, 3)`` [m] into ``state (3, n, 3)`` of a level."""
+    """Copy rows ``rows (n,)`` of displacements ``values (>= n, 3)`` [m] into row 0 of a level's ``state (3, n, 3)``."""
     place = state[0]
     for i in range(len(rows)):
         row = rows[i]
@@ -333,13 +331,13 @@ def begin_substeps(rows, values, state):
 
 @njit(cache=True)  # rounding must not depend on the position of a node, see kernels.motion.move
 def take_substep(coefficients, inverse, change, state):
-    """Add the weighted force to the sum and zero it; move the free nodes, the first ones.
+    """Add the weighted force to the sum and zero it; move the free nodes, the first nf of n.
 
     Args:
-        coefficients: Three scalars: memory, rate, weight, see ``fem.division.chebyshev.Substeps``.
-        inverse: ``(nf, 3)`` DT^2 / m [s^2/kg] of free nodes, zero for fixed components.
-        change: ``(nf, 3)`` [m], of the displacement in the substep before, then in this one.
-        state: ``(3, n, 3)`` displacement [m], force [N], weighted sum of forces [N] of the level.
+        coefficients: Three scalars: factors on the previous change and on DT^2 f / m, weight of the force in the sum.
+        inverse: DT^2 / m of free nodes, zero for fixed components, shape (nf, 3) [s^2/kg].
+        change: Displacement change of the substep before, then of this one, shape (nf, 3) [m].
+        state: Displacement [m], force [N] and weighted sum of forces [N] of the level, shape (3, n, 3).
     """
     memory, rate, weight = coefficients
     factor, step = inverse.reshape(-1), change.reshape(-1)
@@ -358,13 +356,13 @@ def take_substep(coefficients, inverse, change, state):
 
 @njit(cache=True)
 def end_substeps(rows, foreign, state, values):
-    """Add the sum of a level's forces to ``values (>= n, 3)`` [N] of the surrounding level, and zero it.
+    """Add the sum of a level's forces to the force of the surrounding level, and zero it.
 
     Args:
         rows: Rows of the level's nodes in ``values``, shape (n,).
-        foreign: Free nodes whose sum another rank adds, shape (k,).
-        state: State of the level, shape (3, n, 3), see ``take_substep``.
-        values: Added to.
+        foreign: Free nodes whose sum another rank adds (zeroed without adding), shape (k,).
+        state: Displacement [m], force [N] and weighted sum of forces [N] of the level, shape (3, n, 3).
+        values: Force of the surrounding level, shape (>= n, 3) [N], added to.
     """
     total = state[2]
     for i in range(len(foreign)):
@@ -385,8 +383,9 @@ def run_levels(levels, first, values, force):
     For levels with one assembled matrix and no node of another rank; same operations and order as the kernels above.
 
     Args:
-        levels: Each level: rows, foreign, coefficients (p, 3), inverse, change, state, pointer, columns, blocks.
-        first: Index of the level.
+        levels: Tuples, outermost first: arguments rows, foreign, coefficients (p, 3), inverse, change, state of
+            the kernels above; row pointers (n + 1,), columns (nb,), blocks (nb, 3, 3) of its stiffness [N/m].
+        first: Index of the level, scalar.
         values: Displacement of the surrounding level, shape (>= n, 3) [m].
         force: Force of the surrounding level, shape (>= n, 3) [N], added to.
     """

@@ -103,11 +103,11 @@ class HexahedronBlocks(NamedTuple):
 
 @njit(**LANE_OPTIONS)
 def write_centre(inverse, w):
-    """Write F at the centres of sixteen elements, at ``w[DEFORMATION:]``.
+    """Write the deformation gradients F at the centres of sixteen elements, nine entries row by row.
 
     Args:
-        inverse: Inverse of the transformed positions at rest, nine entries of sixteen elements, shape (144,) [1/m].
-        w: Flat workspace with transformed displacements [m].
+        inverse: Inverse of the transformed positions at rest, entry k of element e at ``16 * k + e``, (144,) [1/m].
+        w: Flat workspace in the same order; reads transformed displacements [m], writes F at ``DEFORMATION``.
     """
     for lane in range(LANES):
         m, x, y, z = nine(inverse, lane), three(w, X + lane), three(w, Y + lane), three(w, Z + lane)
@@ -130,14 +130,14 @@ def write_centre(inverse, w):
 
 @njit(**LANE_OPTIONS)
 def add_corners(corners, p, w):
-    """Add the positions at rest, row p of ``corners (np, 336)`` [m], to the displacements in workspace ``w``."""
+    """Add row ``p`` (integer) of positions at rest, ``corners (np, 336)`` [m], to displacements ``w[X:]`` [m]."""
     for k in range(CORNERS):
         w[X + k] += corners[p, k]
 
 
 @njit(**LANE_OPTIONS)
 def turn_back(w):
-    """Rotate the transformed positions in workspace ``w`` into the frame R: x becomes R^T x."""
+    """Rotate the seven transformed positions x, ``w[X:]`` [m], into the frame R, ``w[ROTATION:]``: x becomes R^T x."""
     for k in range(X, MODES, 3 * LANES):
         for lane in range(LANES):
             put_three(w, k + lane, applied(transposed(nine(w, ROTATION + lane)), three(w, k + lane)))
@@ -145,7 +145,7 @@ def turn_back(w):
 
 @njit(**LANE_OPTIONS)
 def turn(w):
-    """Rotate the transformed forces in workspace ``w`` out of the frame R: f becomes R f."""
+    """Rotate the seven transformed forces f, ``w[X:]`` [N], out of the frame R, ``w[ROTATION:]``: f becomes R f."""
     for k in range(X, MODES, 3 * LANES):
         for lane in range(LANES):
             put_three(w, k + lane, applied(nine(w, ROTATION + lane), three(w, k + lane)))
@@ -153,7 +153,11 @@ def turn(w):
 
 @njit(**LANE_OPTIONS)
 def move_place(w, place, b):
-    """Write midpoint and change of the positions in workspace ``w``; store them in row b of ``place (nb, 336)`` [m]."""
+    """Write the midpoint and the change of the transformed positions in a step, and store the positions after it.
+
+    Positions [m], 21 entries of sixteen elements, are read at ``w[X:]`` (after the step) and in row ``b`` of
+    ``place (nb, 336)`` (before it; replaced). ``w`` is written at ``MIDDLE`` and ``CHANGE``.
+    """
     for k in range(CORNERS):
         new, old = w[X + k], place[b, k]
         w[CHANGE + X + k] = new - old
@@ -166,8 +170,8 @@ def write_strains(edges, points):
     """Write the increments of the compatible strain (engineering shear) and their traces at the Gauss points.
 
     Args:
-        edges: Derivatives of the midpoint positions, followed by those of their change, shape (1152,) [m].
-        points: Written: six strains and the trace of sixteen elements at each Gauss point, shape (8, 112).
+        edges: Derivatives of the midpoint positions, then of their change (by ``write_edges``), shape (1152,) [m].
+        points: Written, shape (8, 112): row of a Gauss point xx, yy, zz, xy, yz, xz, trace, of 16 elements each.
     """
     for g in range(8):
         p, q, r = places(g)
@@ -190,7 +194,7 @@ def write_strains(edges, points):
 
 @njit(**LANE_OPTIONS)
 def fit_dilatation(points, fitted):
-    """Replace the dilatations in strains ``points (8, 112)`` by their fits ``fitted (128,)`` at the Gauss points."""
+    """Change normal strains of ``points (8, 112)`` so that their traces become the linear fits ``fitted (128,)``."""
     for g in range(8):
         for lane in range(LANES):
             third = (fitted[LANES * g + lane] - points[g, TRACE + lane]) / 3.0
@@ -204,11 +208,11 @@ def move_points(w, points, reciprocal, state, elastic):
     """Advance the stress of all Gauss points of sixteen elements by an elastic step.
 
     Args:
-        w: Flat workspace, with the strains of the modes at ``SUMS``.
-        points: Strains of ``write_strains``, added to; squared von Mises stresses replace the traces, shape (8, 112).
-        reciprocal: Reciprocals of the weights, shape (8, 16) [1/m^3].
-        state: Stress [Pa] and plastic strain, shape (8, 112); the stress is updated.
-        elastic: Nine scalars [Pa] as in ``kernels.nonlinear.elastic_stress``.
+        w: Flat workspace; reads the strains of the three modes at ``SUMS``, six entries of sixteen elements each.
+        points: Six strains, added to, and their trace, replaced by the squared von Mises stress, shape (8, 112) [Pa^2].
+        reciprocal: Reciprocal volumes of the Gauss points, shape (8, 16) [1/m^3].
+        state: Six stresses [Pa], updated, and the plastic strain, entry k of element e at ``16 * k + e``, (8, 112).
+        elastic: Nine scalars [Pa]: C_xx, C_yy, C_zz, C_xy, C_yz, C_xz (normal), G_xy, G_yz, G_xz.
     """
     for g in range(8):
         x, y, z = GAUSS[g, 0], GAUSS[g, 1], GAUSS[g, 2]
@@ -238,8 +242,8 @@ def count_yielding(points, limit):
     """Return at how many Gauss points of 16 elements the von Mises stress exceeds a limit, as a float.
 
     Args:
-        points: Squared von Mises stresses of ``move_points`` in its last 16 columns, shape (8, 112) [Pa^2].
-        limit: Positive scalar [Pa].
+        points: Squared von Mises stresses in the last 16 columns, shape (8, 112) [Pa^2].
+        limit: Limit of the von Mises stress, positive scalar [Pa].
     """
     count, square = 0.0, limit * limit
     for g in range(8):
@@ -252,8 +256,8 @@ def count_yielding(points, limit):
 def flow(blocks, b, points, step, w):
     """Return the stresses of block ``b`` of ``HexahedronBlocks`` to the yield surface, and add the plastic work.
 
-    ``points`` are strains and squared von Mises stresses of ``move_points (8, 112)``, ``step`` is dt [s], ``w`` is a
-    flat workspace of ``kernels.nonlinear``, overwritten.
+    ``points (8, 112)`` has six strain increments and the squared von Mises stress [Pa^2] of 16 elements at each Gauss
+    point; ``b`` is an integer, ``step`` the time step, a scalar [s]; ``w (544,)`` is a workspace, overwritten.
     """
     state, weight, work = blocks.state[b], blocks.weight[blocks.pattern[b]], blocks.plastic_work[b]
     law = law_of(blocks.plastic, blocks.material[b], step)
@@ -268,7 +272,7 @@ def flow(blocks, b, points, step, w):
 
 @njit(**LANE_OPTIONS)
 def write_pressures(state, points):
-    """Write the mean stresses (positive in tension) of ``state (8, 112)`` into ``points[:, TRACE:]`` [Pa]."""
+    """Write mean stresses (tension > 0) [Pa] of ``state (8, 112)`` to the last 16 columns of ``points (8, 112)``."""
     for g in range(8):
         for lane in range(LANES):
             points[g, TRACE + lane] = (state[g, lane] + state[g, LANES + lane] + state[g, 2 * LANES + lane]) / 3.0
@@ -279,9 +283,9 @@ def write_forces(edges, load, forces):
     """Write the forces on the derivatives of x^ at the Gauss points of sixteen elements.
 
     Args:
-        edges: Derivatives of the positions after the step, shape (>= 576,) [m].
-        load: State (8, 112), ``points`` with mean stresses (8, 112), their fit (128,), weights (8, 16) [m^3].
-        forces: Written, shape (8, 144) [J/m]; along x, y, z, three components each.
+        edges: Derivatives of the positions after the step, as ``write_edges`` writes them, shape (>= 576,) [m].
+        load: State (8, 112), mean stresses in the last 16 columns of (8, 112) [Pa], fit (128,), volumes (8, 16) [m^3].
+        forces: Written, (8, 144) [J/m]: component c along direction d of element e in column ``16 * (3 d + c) + e``.
 
     Returns:
         Number of Gauss points of all elements that are turned inside out, as a float.
@@ -312,14 +316,14 @@ def write_forces(edges, load, forces):
 
 @njit(**LANE_OPTIONS)
 def copy_corners(source, b, w, at):
-    """Copy transformed positions, row ``b`` of ``source (., 336)`` [m], into workspace ``w`` from slot ``at`` on."""
+    """Copy row ``b`` (integer) of transformed positions ``source (nb, 336)`` [m] to ``w[at + X:]``, w flat."""
     for k in range(CORNERS):
         w[at + X + k] = source[b, k]
 
 
 @njit(**LANE_OPTIONS)
 def constants_of(elastic, m):
-    """Return row ``m`` of the elastic constants ``(nm, 9)`` [Pa] as nine scalars."""
+    """Return row ``m`` (integer) of ``elastic (nm, 9)`` [Pa] as nine scalars C_xx yy zz xy yz xz, G_xy yz xz."""
     return (
         elastic[m, 0],
         elastic[m, 1],

@@ -96,7 +96,12 @@ class OnePointBlocks(NamedTuple):
 
 @njit(**LANE_OPTIONS)
 def do_not_turn(w):
-    """Write the identity as rotation R of sixteen elements, at ``w[ROTATION:]`` of a flat workspace."""
+    """Write the identity as rotation R of sixteen elements.
+
+    Args:
+        w: Flat workspace, shape (1312,); 144 entries are written at ``ROTATION``, entry k of element e at
+            ``16 * k + e``.
+    """
     for lane in range(LANES):
         put_nine(w, ROTATION + lane, IDENTITY)
 
@@ -106,7 +111,8 @@ def subtract_slip(w, slip):
     """Subtract the plastic slip from the hourglass amplitudes of sixteen elements.
 
     Args:
-        w: Flat workspace; the twelve amplitudes g^ [m] at ``A`` become their elastic part g^ - slip.
+        w: Flat workspace; the twelve amplitudes g^ [m] at ``A`` (three components of the modes xy, xz, yz, xyz) become
+            their elastic part g^ - slip.
         slip: Slip in the same order, entry k of element e at ``16 * k + e``, shape (192,) [m].
     """
     for k in range(AMPLITUDES):
@@ -118,9 +124,9 @@ def write_hourglass_energy(w, slip, energy):
     """Compute the hourglass energy (g^ - slip) . H (g^ - slip) / 2 of sixteen elements, and restore g^.
 
     Args:
-        w: Flat workspace with the elastic amplitudes [m] at ``A``, to which the slip is added back, and the hourglass
-            forces [N] at ``A + SHIFT``.
-        slip: Plastic slip of the amplitudes, shape (192,) [m].
+        w: Flat workspace with the twelve elastic amplitudes [m] at ``A``, to which the slip is added back, and the
+            twelve hourglass forces [N] at ``A + SHIFT``, entry k of element e at ``16 * k + e``.
+        slip: Plastic slip of the amplitudes in the same order, shape (192,) [m].
         energy: Written, shape (16,) [J].
     """
     for lane in range(LANES):
@@ -148,7 +154,7 @@ def may_slip(w, energy, weight, first, young):
     """Return how many of sixteen elements exceed the hourglass limit at the first yield stress, as a float.
 
     Args:
-        w: Flat workspace with the von Mises stress [Pa] of the centres.
+        w: Flat workspace; reads the von Mises stresses [Pa] of the sixteen centres at ``DEFORMATION + MISES``.
         energy: Hourglass energy, shape (16,) [J].
         weight: Volume, shape (16,) [m^3].
         first: First yield stress, scalar [Pa].
@@ -171,9 +177,10 @@ def hourglass_flow(blocks, b, before, w):
 
     Args:
         blocks: ``OnePointBlocks``; hourglass energy, slip and plastic work of the block are updated.
-        b: Number of the block.
+        b: Number of the block, integer.
         before: Hourglass energy before the step, shape (16,) [J].
-        w: Flat workspace with amplitudes at ``A`` [m] and hourglass forces at ``A + SHIFT`` [N], which are reduced.
+        w: Flat workspace with twelve amplitudes at ``A`` [m], the von Mises stress of the centre at ``DEFORMATION +
+            MISES`` [Pa], and twelve hourglass forces at ``A + SHIFT`` [N], which are reduced.
     """
     law, young = blocks.plastic[blocks.material[b]], blocks.modulus[blocks.material[b]]
     state, weight, slip = blocks.state[b, 0], blocks.weight[blocks.pattern[b], 0], blocks.slip[b]
@@ -197,8 +204,8 @@ def write_nominal_small(w, state, weight):
     """Replace F of sixteen elements by the stress times the volume, for small kinematics.
 
     Args:
-        w: Flat workspace, written at ``DEFORMATION`` [J].
-        state: Flat state of the centres, shape (208,); reads the stress [Pa].
+        w: Flat workspace, written at ``DEFORMATION`` [J], entry k (row by row) of element e at ``16 * k + e``.
+        state: Flat state of the centres in the same order, shape (208,); reads the six stresses [Pa] at ``STRESS``.
         weight: Volume, shape (16,) [m^3].
     """
     for lane in range(LANES):
@@ -208,11 +215,13 @@ def write_nominal_small(w, state, weight):
 
 @njit(**LANE_OPTIONS)
 def write_nominal_finite(w, state, weight):
-    """Replace F of sixteen elements by P, the force on F, for finite kinematics.
+    """Replace F of sixteen elements by P, the nominal stress times volume (derivative of the energy by F).
 
     Args:
-        w: Flat workspace with R, amplitudes g^ [m] and hourglass forces [N]; written at ``DEFORMATION`` [J].
-        state: Flat state of the centres, shape (208,); reads stress [Pa] and stretch.
+        w: Flat workspace, entry k of element e at ``16 * k + e``; reads R at ``ROTATION``, twelve amplitudes g^ at
+            ``A`` [m] and hourglass forces at ``A + SHIFT`` [N]; P is written at ``DEFORMATION`` [J], row by row.
+        state: Flat state of the centres in the same order, shape (208,); reads six stresses [Pa] at ``STRESS`` and six
+            entries of the stretch U at ``STRETCH``.
         weight: Initial volume, shape (16,) [m^3].
     """
     for lane in range(LANES):
@@ -234,9 +243,10 @@ def move_centre(blocks, b, path, w):
 
     Args:
         blocks: ``OnePointBlocks``; state and plastic work of the block are updated.
-        b: Number of the block.
-        path: ``Path``, kinematics and time step.
-        w: Flat workspace with F (finite) or the displacement gradient (small) at ``DEFORMATION``.
+        b: Number of the block, integer.
+        path: ``Path``: small or finite kinematics, and the time step of rate-dependent laws [s].
+        w: Flat workspace; reads F (finite) or the displacement gradient (small) at ``DEFORMATION``, nine entries;
+            writes R at ``ROTATION`` (finite) and the von Mises stress at ``DEFORMATION + MISES`` [Pa].
 
     Returns:
         Whether no element is turned inside out; otherwise the state is unchanged.
@@ -262,10 +272,11 @@ def move_hourglass(blocks, b, unit, before, w):
 
     Args:
         blocks: ``OnePointBlocks``; hourglass energy, slip and plastic work of the block are updated.
-        b: Number of the block.
-        unit: 1.0 for finite kinematics (the workspace has F), 0.0 for small ones (it has F - 1).
-        before: Workspace of shape (16,), overwritten.
-        w: Flat workspace; amplitudes [m] are written at ``A``, forces [N] at ``A + SHIFT``.
+        b: Number of the block, integer.
+        unit: 1.0 for finite kinematics (the workspace has F), 0.0 for small ones (it has F - 1), a scalar.
+        before: Workspace of shape (16,), overwritten by the hourglass energies before the step [J].
+        w: Flat workspace; reads transformed displacements [m], F or F - 1 at ``DEFORMATION`` and R at ``ROTATION``;
+            twelve amplitudes [m] are written at ``A``, twelve forces [N] at ``A + SHIFT``.
     """
     k, energy, slip = blocks.constants[blocks.pattern[b]], blocks.hourglass_energy[b], blocks.slip[b]
     weight, material = blocks.weight[blocks.pattern[b], 0], blocks.material[b]

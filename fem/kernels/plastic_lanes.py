@@ -27,7 +27,17 @@ FLOW, LOGARITHM, CEILING, BEFORE, INVERSE = (NOMINAL + LANES * k for k in range(
 
 
 def bit_pattern(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-    """Generate the LLVM bitcast of a value: ``bits_of`` and ``float_of`` return it to Numba as their code generator."""
+    """Generate the LLVM instruction that reinterprets the bits of a value; Numba calls it to compile ``bits_of``.
+
+    Args:
+        context: Numba's target context, which translates types.
+        builder: LLVM IR builder of the function that is compiled.
+        signature: Numba signature; its return type is the type of the result.
+        arguments: LLVM values of the arguments, of which there is one.
+
+    Returns:
+        LLVM value of the result.
+    """
     return builder.bitcast(arguments[0], context.get_value_type(signature.return_type))
 
 
@@ -115,12 +125,12 @@ def start_flow(w, state, g, law, reference):
     Args:
         w: Flat workspace of ``kernels.nonlinear``. Reads the trial von Mises stress q [Pa] at ``MISES``; writes x at
             ``FLOW``, y at ``LOGARITHM``, its upper bound at ``CEILING``, the hardening before the step [Pa] at
-            ``BEFORE`` and the reciprocal of the plastic strain at ``INVERSE``.
+            ``BEFORE`` and the reciprocal of the plastic strain at ``INVERSE``; sixteen entries each.
         state: State of all points, shape (points, >= 112); reads the plastic strain at ``PLASTIC``.
-        g: Number of the point, row of ``state``.
+        g: Number of the point, row of ``state``, integer.
         law: 3 G [Pa], first yield stress [Pa], hardening modulus [Pa], exponent and rate sensitivity C, which is 0
             where the rate does not count; scalars.
-        reference: Increment of the plastic strain at the reference rate, positive; 1 if the rate does not count.
+        reference: Increment of the plastic strain at the reference rate, positive scalar; 1 if the rate does not count.
 
     Returns:
         Number of the sixteen elements that yield, as a float.
@@ -149,7 +159,8 @@ def growing(w):
     """Return the number of the sixteen elements, as a float, whose plastic strain grows too much for ``small_power``.
 
     Args:
-        w: Workspace of ``start_flow``; reads the slots ``FLOW`` and ``INVERSE``.
+        w: Flat workspace; reads plastic strain increments at ``FLOW`` and reciprocals of the plastic strain before the
+            step at ``INVERSE``, sixteen entries each.
     """
     count = 0.0
     for lane in range(LANES):
@@ -162,11 +173,12 @@ def improve_flow(w, state, g, law, reference):
     """Take a Newton step in y = ln(x / reference) for the plastic strain increments x of sixteen elements at one point.
 
     Args:
-        w: Workspace of ``start_flow``; x at ``FLOW`` and y at ``LOGARITHM`` are improved.
-        state: As in ``start_flow``.
-        g: As in ``start_flow``.
-        law: As in ``start_flow``.
-        reference: As in ``start_flow``.
+        w: Flat workspace that ``start_flow`` has filled; x at ``FLOW`` and y at ``LOGARITHM`` are improved, sixteen
+            entries each.
+        state: State of all points, shape (points, >= 112); reads the plastic strain at ``PLASTIC``.
+        g: Number of the point, row of ``state``, integer.
+        law: 3 G [Pa], first yield stress [Pa], hardening modulus [Pa], exponent and rate sensitivity; scalars.
+        reference: Increment of the plastic strain at the reference rate, positive scalar; 1 if the rate does not count.
 
     Returns:
         Number of elements that have not converged, as a float.
@@ -197,11 +209,12 @@ def finish_flow(w, state, g, stiffness):
     """Return the stresses of sixteen elements at one point to the yield surface by the converged increments.
 
     Args:
-        w: Workspace of ``start_flow``: the plastic strain increments at ``FLOW`` become plastic work densities [J/m^3],
-            the trial von Mises stress at ``MISES`` the stress after the step [Pa].
-        state: State of all points, shape (points, >= 112); stress and plastic strain of the point are updated.
-        g: Number of the point, row of ``state``.
-        stiffness: 3 G [Pa].
+        w: Flat workspace: the plastic strain increments at ``FLOW`` become plastic work densities [J/m^3], the trial
+            von Mises stresses at ``MISES`` the ones after the step [Pa]; reads six strain increments at ``INCREMENT``.
+        state: State of all points, entry k of element e in column ``16 * k + e``, shape (points, >= 112); the six
+            stresses [Pa] and the plastic strain of the point are updated.
+        g: Number of the point, row of ``state``, integer.
+        stiffness: 3 G with the shear modulus G, scalar [Pa].
     """
     for lane in range(LANES):
         s, d, flow, trial = six_of(state, g, lane), six(w, INCREMENT + lane), w[FLOW + lane], w[MISES + lane]
@@ -231,12 +244,12 @@ def finish_flow(w, state, g, stiffness):
 
 @njit(**LANE_OPTIONS)
 def law_of(plastic, material, step):
-    """Return the plastic law of a material as seven scalars.
+    """Return the constants of the plastic law of a material, and the time step, as seven scalars.
 
     Args:
         plastic: Plastic constants of the materials, shape (nm, 6), see ``materials.plasticity.plastic_constants``.
-        material: Index of the material.
-        step: Time step dt [s].
+        material: Index of the material, integer.
+        step: Time step dt, scalar [s].
 
     Returns:
         3 G [Pa], first yield stress [Pa], hardening modulus [Pa], exponent, rate sensitivity, reference rate [1/s], dt
@@ -251,12 +264,14 @@ def plastic_flow(w, state, g, law):
     """Return the stress of sixteen elements at one point to the yield surface where the trial state lies outside.
 
     Args:
-        w: Flat workspace of ``kernels.nonlinear`` with the strain increment at ``INCREMENT`` and the trial von Mises
-            stress at ``MISES`` [Pa], which becomes the stress after the step.
-        state: State of all points, shape (points, >= 112), with the elastic trial stress [Pa]; stress and plastic
-            strain of the point are updated (radial return).
-        g: Number of the point, row of ``state``.
-        law: Seven scalars of ``law_of``.
+        w: Flat workspace, shape (544,), with six strain increments at ``INCREMENT`` and the trial von Mises stress at
+            ``MISES`` [Pa], which becomes the one after the step; plastic work densities [J/m^3] are written at
+            ``FLOW``.
+        state: State of all points, entry k of element e in column ``16 * k + e``, shape (points, >= 112): six elastic
+            trial stresses [Pa] and the plastic strain; both are updated at the point (radial return).
+        g: Number of the point, row of ``state``, integer.
+        law: Seven scalars: 3 G [Pa], first yield stress [Pa], hardening modulus [Pa], exponent, rate sensitivity,
+            reference rate [1/s], time step [s].
 
     Returns:
         Whether any of the elements yields; then ``add_work`` can follow.
@@ -284,9 +299,9 @@ def add_work(w, weight, g, work):
     C^-1 : s / 2 is integrated by the mean stress exactly: the sum of both is the work of the internal force.
 
     Args:
-        w: Workspace after ``plastic_flow``, with plastic work densities [J/m^3].
+        w: Flat workspace; reads the sixteen plastic work densities at ``FLOW`` [J/m^3], which ``plastic_flow`` writes.
         weight: Volumes of the points, shape (points, 16) [m^3].
-        g: Number of the point, row of ``weight``.
+        g: Number of the point, row of ``weight``, integer.
         work: Plastic work of each element, shape (16,) [J], added to.
     """
     for lane in range(LANES):
@@ -295,7 +310,13 @@ def add_work(w, weight, g, work):
 
 @njit(**LANE_OPTIONS)
 def count_above(values, at, limit):
-    """Return how many of the sixteen scalars ``values[at]`` to ``values[at + 15]`` are above a limit, as a float."""
+    """Return how many of the sixteen scalars ``values[at]`` to ``values[at + 15]`` are above a limit, as a float.
+
+    Args:
+        values: Flat array, shape (>= at + 16,).
+        at: Position of the first scalar, integer.
+        limit: Limit, a scalar in the unit of the values.
+    """
     count = 0.0
     for lane in range(LANES):
         count += 1.0 if values[at + lane] > limit else 0.0

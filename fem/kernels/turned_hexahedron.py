@@ -59,7 +59,13 @@ GRADIENT, CORNERS, STIFFNESS = 9 * LANES, 30 * LANES, 42 * LANES
 
 @njit(**LANE_OPTIONS)
 def add_product(f, a, b):
-    """Return f + a (x) b as nine scalars, row by row; f is a 3 x 3 matrix (nine scalars), a and b are vectors."""
+    """Return f + a (x) b as nine scalars, row by row.
+
+    Args:
+        f: 3 x 3 matrix, nine scalars row by row.
+        a: Vector, three scalars.
+        b: Vector, three scalars.
+    """
     return (
         f[0] + a[0] * b[0], f[1] + a[0] * b[1], f[2] + a[0] * b[2],
         f[3] + a[1] * b[0], f[4] + a[1] * b[1], f[5] + a[1] * b[2],
@@ -72,9 +78,11 @@ def write_mean_deformation(k, w, unit):
     """Write the mean deformation gradient F of sixteen elements.
 
     Args:
-        k: Constants of the elements, entry i of element e at ``16 * i + e``, shape (1920,), see the module.
-        w: Flat workspace of ``SLOTS`` entries; reads the transformed displacements [m], writes F at ``DEFORMATION``.
-        unit: 1.0, or 0.0 to write the displacement gradient F - 1 instead of F.
+        k: Constants of the elements (V C, b_p, c_k, H), entry i of element e at ``16 * i + e``, shape (1920,); reads
+            the mean gradients b_p [1/m].
+        w: Flat workspace of ``SLOTS`` entries in the same order; reads the transformed displacements [m], writes F at
+            ``DEFORMATION``, nine entries row by row.
+        unit: 1.0, or 0.0 to write the displacement gradient F - 1 instead of F; a scalar.
     """
     b = k[GRADIENT - 3 * LANES :]
     for lane in range(LANES):
@@ -96,7 +104,7 @@ def amplitude(c, q, r, f, unit):
         q: Transformed displacement of the mode, three scalars [m].
         r: Rotation R, nine scalars row by row.
         f: F if ``unit`` is 1.0, F - 1 if it is 0.0; nine scalars.
-        unit: See ``f``.
+        unit: 1.0 or 0.0, see ``f``; a scalar.
     """
     moved = applied(f, c)
     x, y, z = q[0] - moved[0] + unit * c[0], q[1] - moved[1] + unit * c[1], q[2] - moved[2] + unit * c[2]
@@ -108,9 +116,11 @@ def write_amplitudes(k, w, unit):
     """Write the hourglass amplitudes g^ [m] of sixteen elements at the slots ``A`` to ``D`` of the workspace.
 
     Args:
-        k: As in ``write_mean_deformation``.
-        unit: As in ``write_mean_deformation``.
-        w: Flat workspace of ``SLOTS`` entries with transformed displacements, F (or F - 1) and R.
+        k: Constants of the elements, entry i of element e at ``16 * i + e``, shape (1920,); reads the transformed
+            corners c_k [m].
+        w: Flat workspace of ``SLOTS`` entries in the same order, with transformed displacements [m], F (or F - 1) at
+            ``DEFORMATION`` and R at ``ROTATION``; written at ``A`` to ``D``, three components of one mode each.
+        unit: 1.0 if the workspace has F, 0.0 if it has F - 1; a scalar.
     """
     for lane in range(LANES):
         r, f = nine(w, ROTATION + lane), nine(w, DEFORMATION + lane)
@@ -132,9 +142,10 @@ def write_resistance(k, w):
     """Write the hourglass forces H g^ [N] of sixteen elements, at the slots ``A + SHIFT`` to ``D + SHIFT``.
 
     Args:
-        k: Constants of the elements, shape (1920,), with the stiffness H as symmetric blocks of the four modes;
-            off-diagonal blocks are stored once and act twice.
-        w: Flat workspace of ``SLOTS`` entries with the amplitudes g^ [m] at ``A`` to ``D``.
+        k: Constants of the elements, entry i of element e at ``16 * i + e``, shape (1920,); reads the stiffness H
+            [N/m], 3 x 3 blocks of the four modes; off-diagonal blocks are stored once and act twice.
+        w: Flat workspace of ``SLOTS`` entries in the same order, with the amplitudes g^ [m] at ``A`` to ``D``, three
+            components each; the forces are written ``SHIFT`` entries after them.
     """
     for lane in range(LANES):
         a, b, c, d = three(w, A + lane), three(w, B + lane), three(w, C + lane), three(w, D + lane)
@@ -155,11 +166,13 @@ def write_resistance(k, w):
 
 @njit(**LANE_OPTIONS)
 def write_stress(k, w):
-    """Replace F of sixteen elements by P [J], the force on F; see ``kernels.box_rotation``.
+    """Replace F of sixteen elements by P, the derivative of the energy by F (nominal stress times volume).
 
     Args:
-        k: Constants of the elements, shape (1920,); reads V C [J].
-        w: Flat workspace of ``SLOTS`` entries with F, R, the amplitudes g^ [m] and the forces H g^ [N].
+        k: Constants of the elements, entry i of element e at ``16 * i + e``, shape (1920,); reads the elastic constants
+            times volume, V C [J].
+        w: Flat workspace of ``SLOTS`` entries in the same order, with R at ``ROTATION``, the amplitudes g^ at ``A`` to
+            ``D`` [m] and the forces H g^ ``SHIFT`` entries after them [N]; F at ``DEFORMATION`` becomes P [J].
     """
     for lane in range(LANES):
         r = nine(w, ROTATION + lane)
@@ -180,8 +193,10 @@ def replace_by_turned_forces(k, w):
     """Replace the transformed displacements of sixteen elements by the forces on them [N].
 
     Args:
-        k: Constants of the elements, shape (1920,).
-        w: Flat workspace of ``SLOTS`` entries with P [J] in the place of F, R, and the forces H g^ [N].
+        k: Constants of the elements (V C [J], b_p [1/m], c_k [m], H [N/m]), entry i of element e at ``16 * i + e``,
+            shape (1920,).
+        w: Flat workspace of ``SLOTS`` entries with P at ``DEFORMATION`` [J], R at ``ROTATION`` and the forces H g^ at
+            ``A + SHIFT`` to ``D + SHIFT`` [N]; its first 24 entries of sixteen elements are overwritten.
     """
     b = k[GRADIENT - 3 * LANES :]
     for lane in range(LANES):
@@ -202,7 +217,13 @@ def replace_by_turned_forces(k, w):
 
 @njit(**LANE_OPTIONS)
 def less_product(f, a, b):
-    """Return f - a (x) b as nine scalars, row by row; f is a 3 x 3 matrix (nine scalars), a and b are vectors."""
+    """Return f - a (x) b as nine scalars, row by row.
+
+    Args:
+        f: 3 x 3 matrix, nine scalars row by row.
+        a: Vector, three scalars.
+        b: Vector, three scalars.
+    """
     return add_product(f, (-a[0], -a[1], -a[2]), b)
 
 
@@ -211,10 +232,12 @@ def read_block(cells, displacement, k, w):
     """Write transformed displacements, F, R, hourglass amplitudes g^ and forces H g^ of sixteen elements.
 
     Args:
-        cells: Nodes of the elements, shape (8, 16).
+        cells: Nodes of the elements, node a of element e in ``cells[a, e]``, shape (8, 16) int32.
         displacement: Nodal displacement, shape (n, 3) [m].
-        k: Constants of the elements, shape (1920,).
-        w: Flat workspace of ``SLOTS`` entries, written.
+        k: Constants of the elements (V C [J], b_p [1/m], c_k [m], H [N/m]), entry i of element e at ``16 * i + e``,
+            shape (1920,).
+        w: Flat workspace of ``SLOTS`` entries, written: transformed displacements [m] first, F at ``DEFORMATION``, R at
+            ``ROTATION``, g^ at ``A`` to ``D`` [m], H g^ at ``A + SHIFT`` to ``D + SHIFT`` [N].
 
     Returns:
         Whether no element is turned inside out; if one is, the results are meaningless.
@@ -260,10 +283,12 @@ def turned_energies(cells, filled, constants, displacement):
     """Return the total energies of mean strains and of hourglass modes, two scalars [J].
 
     Args:
-        cells: As in ``add_turned_forces``.
-        filled: As in ``add_turned_forces``.
-        constants: As in ``add_turned_forces``.
-        displacement: As in ``add_turned_forces``.
+        cells: Nodes of the elements in tensor order, in blocks of sixteen elements, shape (nb, 8, 16) int32; elements
+            after the last one repeat it and are not counted.
+        filled: Number of elements of each block, shape (nb,) int32.
+        constants: 120 constants of each element (V C [J], b_p [1/m], c_k [m], H [N/m]), entry i of element e at
+            ``16 * i + e``, shape (nb, 1920).
+        displacement: Nodal displacement, shape (n, 3) [m].
     """
     w = np.zeros(SLOTS)
     mean = higher = 0.0

@@ -161,7 +161,12 @@ class BodyAcceleration(Load):
 
 
 def half_sine_drop(peak: float, duration: float) -> BodyAcceleration:
-    """Return the half sine of a drop with the package facing down: peak [m/s^2], duration [s]; it acts along +z."""
+    """Return the half-sine body acceleration of a drop with the package facing down; it acts along +z.
+
+    Args:
+        peak: Peak acceleration [m/s^2].
+        duration: Duration of the half sine [s].
+    """
     return BodyAcceleration(DOWN, HalfSine(peak, duration))
 
 

@@ -170,6 +170,10 @@ class Tabulated:
 
 
 def service_condition(name: str) -> HalfSine:
-    """Return the acceleration pulse [m/s^2] of a JEDEC service condition, a key of ``SERVICE_CONDITIONS``."""
+    """Return the half-sine acceleration pulse of a JEDEC service condition, peak [m/s^2] and duration [s].
+
+    Args:
+        name: Letter "A" to "H", a key of ``SERVICE_CONDITIONS``.
+    """
     peak, milliseconds = SERVICE_CONDITIONS[name]
     return HalfSine(peak * STANDARD_GRAVITY, milliseconds * 1e-3)

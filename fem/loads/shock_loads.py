@@ -16,7 +16,11 @@ from reflowshock.fem.problem.shock import Shock
 
 
 def check_shaken(tables: Iterable[JointTables], shock: Shock) -> None:
-    """Check that a large mass has support nodes to act on.
+    """Check that a large mass, which moves the supports in place of the drop table, has support nodes to act on.
+
+    Args:
+        tables: Tables of all models, with the nodes of their mounting holes.
+        shock: Parameters of the shock; nothing is checked unless its method is ``large_mass``.
 
     Raises:
         LoadError: No model has support nodes.

@@ -26,17 +26,30 @@ class ShockPulse:
 
 
 def shock_pulse(shock: Shock) -> ShockPulse:
-    """Return the pulse of a shock and the decision on gravity.
+    """Return the acceleration pulse of a shock, its source as text, and the decision on gravity.
+
+    Args:
+        shock: Parameters of the shock: a table file, a JEDEC service condition, or peak and duration of a half sine.
 
     Raises:
         PulseError: The table of the pulse cannot be read.
+        ValueError: The shock has none of the three.
     """
     pulse, source = input_pulse(shock)
     return ShockPulse(pulse, source, WeightEffect.by_peak(shock.gravity, pulse.peak, STANDARD_GRAVITY))
 
 
 def input_pulse(shock: Shock) -> tuple[HalfSine | Tabulated, str]:
-    """Return the acceleration pulse of the drop table [m/s^2] and its source as text; raises as ``shock_pulse``."""
+    """Return the upward acceleration pulse of the drop table [m/s^2], and its source as text.
+
+    Args:
+        shock: Parameters of the shock: a table file, else a JEDEC service condition, else peak and duration of a half
+            sine.
+
+    Raises:
+        PulseError: The table of the pulse cannot be read.
+        ValueError: The shock has none of the three.
+    """
     if shock.table is not None:
         return read_pulse(Path(shock.table), "acceleration", shock.table_column), f"table {Path(shock.table).name}"
     if shock.service_condition is not None:

@@ -91,10 +91,19 @@ BUILDERS: Mapping[type[Pulsed], Builder] = {
 
 
 def unit(direction: tuple[float, float, float]) -> NDArray[np.float64]:
-    """Return the unit vector along a direction, shape (3,)."""
+    """Return the unit vector along a direction, shape (3,).
+
+    Args:
+        direction: Components along x, y, z, not all zero.
+    """
     return np.array(direction) / np.linalg.norm(direction)
 
 
 def damping_loads(damping: Damping, body: Body) -> list[Load]:
-    """Return the Rayleigh damping of a structure as a list with one load, or an empty list without damping."""
+    """Return the Rayleigh damping of a structure as a list with one load, or an empty list without damping.
+
+    Args:
+        damping: Coefficients of mass-proportional [1/s] and stiffness-proportional [s] damping.
+        body: Model on this rank.
+    """
     return [RayleighDamping.build(body, *damping.coefficients)] if any(damping.coefficients) else []

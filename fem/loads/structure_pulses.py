@@ -13,16 +13,29 @@ SHAPES: dict[str, type[HalfSine] | type[Haversine]] = {"half_sine": HalfSine, "h
 
 
 def pulses_of(loads: Mapping[str, StructureLoad]) -> dict[str, Pulse]:
-    """Return the pulse of each load by name.
+    """Return the pulse (value over time) of each load by name, in SI units of the load.
+
+    Args:
+        loads: Loads of the case file by name.
 
     Raises:
         PulseError: A table cannot be read.
+        ValueError: A load has neither peak nor table.
     """
     return {name: pulse_of(load) for name, load in loads.items()}
 
 
 def pulse_of(load: StructureLoad) -> Pulse:
-    """Return the pulse of a load in SI units of its quantity; errors as ``pulses_of``."""
+    """Return the pulse of a load over time [s], in SI units of its quantity.
+
+    Args:
+        load: Load with a table file, a JEDEC service condition, or a peak with shape and duration; a constant load
+            without duration lasts for ever.
+
+    Raises:
+        PulseError: The table cannot be read.
+        ValueError: The load has neither peak nor table.
+    """
     if load.table is not None:
         return read_pulse(Path(load.table), load.quantity, load.table_column)
     if load.jedec_condition is not None:
@@ -35,6 +48,10 @@ def pulse_of(load: StructureLoad) -> Pulse:
 
 
 def pulse_durations(pulses: Mapping[str, Pulse]) -> list[float]:
-    """Return the durations of all pulses that are not constant [s]."""
+    """Return the durations of all pulses that are not constant [s]; empty if all are constant.
+
+    Args:
+        pulses: Name of a load -> its pulse; a table lasts from its first to its last time.
+    """
     sines = [pulse.duration for pulse in pulses.values() if isinstance(pulse, HalfSine | Haversine)]
     return sines + [float(np.ptp(pulse.times)) for pulse in pulses.values() if isinstance(pulse, Tabulated)]

@@ -30,7 +30,12 @@ SAME = 1e-6  # of a column's size: distance of nodes that neighbouring columns s
 
 
 def insert_columns(mesh: MeshData) -> MeshData:
-    """Replace boxes by the columns of fine joints, and name the facets that ``tie_joints`` ties.
+    """Replace boxes of the coarse mesh by the columns of fine joints, and name the facets that ``tie_joints`` ties.
+
+    A column is the part of board and package around a fine joint, with its own mesh.
+
+    Args:
+        mesh: Mesh with all boxes and columns, which overlap; returned unchanged if it has no columns.
 
     Raises:
         MeshError: The boxes in place of a column do not have its volume, or neighbouring columns do not match.
@@ -90,7 +95,11 @@ def _shared_facets(cells: NDArray[np.int32], gone: NDArray[np.bool_]) -> NDArray
 
 
 def drop_stale_facets(mesh: MeshData) -> MeshData:
-    """Drop the facets that belong to no cell any more."""
+    """Return the mesh without the facets that are no face of any cell; empty facet sets remain.
+
+    Args:
+        mesh: Mesh with at least one facet set.
+    """
     has_cell = cells_of_facets(mesh.cells, np.concatenate(list(mesh.facets.values()))) >= 0  # one search sorts all
     ends = np.cumsum([len(some) for some in mesh.facets.values()])[:-1]
     sets = zip(mesh.facets.items(), np.split(has_cell, ends), strict=True)

@@ -12,7 +12,10 @@ MACRO, PATCH = "board", "board_patch"
 
 
 def find_interface(mesh: MeshData) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Match the patch's faces inside the board with the board's nodes.
+    """Match the faces of the board patch (under the package) inside the board with the board's nodes.
+
+    Args:
+        mesh: Mesh of board and board patch.
 
     Returns:
         Node numbers of the macro side and of the meso side, ``(nc,)`` each; equal where the parts share nodes, empty

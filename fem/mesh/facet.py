@@ -32,7 +32,7 @@ def _quadrilateral() -> FacetRule:
 
 
 def triangle() -> FacetRule:
-    """Return the one-point (centroid) quadrature rule of a linear triangle."""
+    """Return the one-point (centroid) quadrature rule of a linear triangle, for shape functions of its three nodes."""
     return FacetRule(np.full((1, 3), 1.0 / 3.0), BARYCENTRIC[None], np.full(1, 0.5))
 
 

@@ -15,6 +15,10 @@ from reflowshock.fem.mesh.mesh import MeshData, cells_of_facets
 def facet_set(mesh: MeshData, name: str) -> NDArray[np.int32]:
     """Return the node numbers of the facets of a set, shape (nf, m), in the order of ``MeshData.facets``.
 
+    Args:
+        mesh: Mesh with the facet set.
+        name: Name of the facet set.
+
     Raises:
         LoadError: The mesh has no such set, or it is empty.
     """
@@ -51,10 +55,14 @@ class OutwardFacets:
 
 
 def outward_facets(mesh: MeshData, name: str) -> OutwardFacets:
-    """Return a facet set with its outward direction.
+    """Return a facet set with the cell of each facet and the sign of its normal (+1 outwards by the right-hand rule).
+
+    Args:
+        mesh: Mesh with the facet set.
+        name: Name of the facet set.
 
     Raises:
-        LoadError: The set does not exist, or one of its facets belongs to no cell.
+        LoadError: The set does not exist or is empty, or one of its facets belongs to no cell.
     """
     facets = facet_set(mesh, name)
     cells = cells_of_facets(mesh.cells, facets)
@@ -67,11 +75,18 @@ def outward_facets(mesh: MeshData, name: str) -> OutwardFacets:
 
 
 def outward_areas(mesh: MeshData, name: str) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Integrate shape function times outward normal over a facet set; errors as in ``outward_facets``.
+    """Integrate shape function times outward normal over a facet set.
+
+    Args:
+        mesh: Mesh with the facet set.
+        name: Name of the facet set.
 
     Returns:
         Nodes, shape (k,), and their area vectors, shape (k, 3) [m^2]; a pressure p gives the nodal forces -p times
         these vectors.
+
+    Raises:
+        LoadError: The set does not exist or is empty, or one of its facets belongs to no cell.
     """
     outward = outward_facets(mesh, name)
     areas = area_vectors(mesh.points[outward.facets]) * outward.sign[:, None, None]

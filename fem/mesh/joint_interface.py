@@ -52,6 +52,12 @@ def whole_joint_interface(mesh: MeshData) -> JointInterfaceTable:
     """Return the facets on the package pads of all joints of an undivided mesh, in the numbers of this mesh.
 
     Facets without a solder element are not checked here; ``watch_table`` raises an error for them.
+
+    Args:
+        mesh: Mesh of board, package and joints.
+
+    Returns:
+        Joint, nodes, corners and solder element of each facet; empty arrays if the mesh has no joints.
     """
     joints = joint_names(mesh)
     facets = [mesh.facets_of(f"{SIDE}{name}") for name in joints]

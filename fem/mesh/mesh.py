@@ -50,6 +50,9 @@ class MeshData:
 def append(meshes: Sequence[MeshData]) -> MeshData:
     """Concatenate meshes without merging nodes; parts and facet sets of equal name are joined.
 
+    Args:
+        meshes: Meshes, at least one; nodes and cells are numbered in this order.
+
     Raises:
         MeshError: The meshes have cells of different shapes.
     """
@@ -81,6 +84,9 @@ def append(meshes: Sequence[MeshData]) -> MeshData:
 def without_unused_nodes(data: MeshData) -> tuple[MeshData, NDArray[np.int32]]:
     """Drop the nodes that belong to no cell, and the facets with such a node.
 
+    Args:
+        data: The mesh, with n nodes.
+
     Returns:
         The mesh, and the new number of each old node, -1 for dropped nodes, shape (n,).
     """
@@ -92,12 +98,30 @@ def without_unused_nodes(data: MeshData) -> tuple[MeshData, NDArray[np.int32]]:
 
 
 def select(data: MeshData, accept: Callable[[str], bool]) -> tuple[MeshData, NDArray[np.int32]]:
-    """Extract all parts for which ``accept(part_name)`` is true as a mesh; returns and errors as ``selected_cells``."""
+    """Extract all parts whose name is accepted as a mesh.
+
+    Args:
+        data: Mesh with named parts.
+        accept: Function from a part name to whether the part is extracted.
+
+    Returns:
+        The mesh, and the new number of each old node, -1 for dropped nodes, shape (n,).
+
+    Raises:
+        MeshError: No cell is extracted.
+    """
     return selected_cells(data, data.in_parts(accept))
 
 
 def selected_cells(data: MeshData, chosen: NDArray[np.bool_]) -> tuple[MeshData, NDArray[np.int32]]:
-    """Extract the chosen cells, a mask of shape (ne,), as a mesh; returns as in ``without_unused_nodes``.
+    """Extract the chosen cells, with their nodes and the facets on these nodes, as a mesh.
+
+    Args:
+        data: The mesh.
+        chosen: Whether each cell is extracted, shape (ne,).
+
+    Returns:
+        The mesh, and the new number of each old node, -1 for dropped nodes, shape (n,).
 
     Raises:
         MeshError: No cell is chosen.
@@ -120,7 +144,8 @@ def merge_nodes(
         originals: Node that replaces each of them, shape (k,).
 
     Returns:
-        As in ``without_unused_nodes``.
+        The mesh, and the new number of each old node, shape (n,): that of its original for a duplicate, -1 for nodes
+        without a cell, which are dropped, too.
     """
     number = np.arange(len(data.points), dtype=np.int32)
     number[duplicates] = originals
@@ -130,7 +155,11 @@ def merge_nodes(
 
 
 def boundary_facets(cells: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Return the faces that belong to one cell only, shape (nf, m), nodes in the order of ``CellShape.faces``."""
+    """Return the faces that belong to one cell only, shape (nf, m), nodes in the order of ``CellShape.faces``.
+
+    Args:
+        cells: Nodes of each cell, shape (ne, k).
+    """
     local = shape_of(cells).faces
     faces = cells[:, local].reshape(-1, local.shape[1])
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
@@ -138,7 +167,12 @@ def boundary_facets(cells: NDArray[np.int32]) -> NDArray[np.int32]:
 
 
 def cells_of_facets(cells: NDArray[np.int32], facets: NDArray[np.int32]) -> NDArray[np.int64]:
-    """Return the first cell that contains each facet (nf, m), -1 if no cell does, shape (nf,)."""
+    """Return the first cell that contains each facet, -1 if no cell does, shape (nf,).
+
+    Args:
+        cells: Nodes of each cell, shape (ne, k).
+        facets: Nodes of each facet in any order, shape (nf, m).
+    """
     local = shape_of(cells).faces
     faces = np.sort(cells[:, local].reshape(-1, local.shape[1]), axis=1)
     _, label = np.unique(np.concatenate([faces, np.sort(facets, axis=1)]), axis=0, return_inverse=True)

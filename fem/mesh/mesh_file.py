@@ -25,12 +25,24 @@ MIDDLE[EDGES[:, 0], EDGES[:, 1]] = MIDDLE[EDGES[:, 1], EDGES[:, 0]] = 4 + np.ara
 
 
 def read_meshes(paths: Sequence[Path]) -> MeshData:
-    """Read Gmsh files and concatenate them into one mesh without merging nodes; raises as ``read_mesh``, ``append``."""
+    """Read Gmsh 4.1 files and concatenate them into one mesh without merging nodes.
+
+    Parts and facet sets of equal name are joined.
+
+    Args:
+        paths: Files, at least one.
+
+    Raises:
+        MeshError: A file has no usable cells (see ``read_mesh``), or the files have cells of different shapes.
+    """
     return append([read_mesh(path) for path in paths])
 
 
 def read_mesh(path: Path) -> MeshData:
-    """Read one Gmsh 4.1 file.
+    """Read one Gmsh 4.1 file as a mesh whose parts are its physical volumes and whose facet sets its physical surfaces.
+
+    Args:
+        path: File to be read.
 
     Raises:
         MeshError: The file has no cells of a supported shape, several shapes, a cell in no or several volumes, or a

@@ -120,7 +120,15 @@ def _pad_face(mesh: MeshData, name: str, solder: NDArray[np.intp], inward: float
 def facet_sums(
     corners: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return area vectors (f, 3) [m^2], areas times centroids (f, 3) [m^3] and areas (f,) [m^2] of facets (f, 4, 3)."""
+    """Return area vectors and first moments of quadrilateral facets.
+
+    Args:
+        corners: Corners of the facets in cyclic order, shape (f, 4, 3) [m].
+
+    Returns:
+        Area vectors, shape (f, 3) [m^2], with the normal by the right-hand rule; areas times centroids, shape (f, 3)
+        [m^3]; and areas, shape (f,) [m^2].
+    """
     normal = 0.5 * np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     area = np.linalg.norm(normal, axis=1)
     first = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
@@ -131,7 +139,11 @@ def facet_sums(
 
 
 def polar_moment(corners: NDArray[np.float64]) -> float:
-    """Return the polar second moment of area [m^4] of plane facets (f, 4, 2) [m] about the origin."""
+    """Return the polar second moment of area of all facets together about the origin [m^4].
+
+    Args:
+        corners: Corners of plane facets in cyclic order, in coordinates of the plane, shape (f, 4, 2) [m].
+    """
     total = 0.0
     for triangle in (corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]):
         first, second = triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0]
@@ -142,7 +154,14 @@ def polar_moment(corners: NDArray[np.float64]) -> float:
 
 
 def section_frame(normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return orthonormal frames (..., 3, 3) of faces with normals (..., 3) of any length; rows as in ``PadFaces``."""
+    """Return right-handed orthonormal frames of faces, shape (..., 3, 3).
+
+    Their rows are two directions in the face, and the normal. The first direction is the projection of x into the face,
+    or of y if the normal is nearly along x.
+
+    Args:
+        normal: Normals of any length above zero, shape (..., 3).
+    """
     axis = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
     along = np.where(np.abs(axis[..., :1]) < 0.9, np.eye(3)[0], np.eye(3)[1])
     first = along - np.sum(along * axis, axis=-1, keepdims=True) * axis

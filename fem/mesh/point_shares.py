@@ -73,5 +73,9 @@ def _trilinear(corners: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray
 
 
 def shape_functions(xi: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the trilinear shape functions at points xi (m, 3) of the reference cube [-1, 1]^3, shape (m, 8)."""
+    """Return the trilinear shape functions of the reference cube [-1, 1]^3, shape (m, 8), nodes in tensor order.
+
+    Args:
+        xi: Points in the cube, shape (m, 3).
+    """
     return 0.125 * np.prod(1.0 + xi[:, None, :] * SIDES, axis=2)

@@ -87,8 +87,11 @@ def point_table(
     Args:
         mesh: The whole mesh.
         positions: Name -> coordinates of a watch point [m].
-        supports: Name -> nodes and held components.
+        supports: Name -> nodes of a support, shape (k,), and whether it holds each component, shape (3,).
         yields: Whether plastic strain is also recorded.
+
+    Returns:
+        Nearest node of each point, and the elements and weights for its strain and stress, in numbers of the mesh.
 
     Raises:
         MeshError: A point lies outside the mesh.
@@ -131,9 +134,13 @@ def _nearest_node(mesh: MeshData, name: str, position: NDArray[np.float64]) -> i
 
 
 def patch(mesh: MeshData, node: int) -> NDArray[np.int64]:
-    """Return the numbers of the elements of one part around a node, followed by their neighbours, shape (m,).
+    """Return the numbers of the elements of one part around a node, followed by their neighbours in it, shape (m,).
 
-    If several parts meet at the node, the lowest one is used.
+    If several parts meet at the node, the lowest one along z is used.
+
+    Args:
+        mesh: The mesh.
+        node: Number of the node.
     """
     first = np.flatnonzero((mesh.cells == node).any(axis=1))
     heights = {part: mesh.points[mesh.cells[first[mesh.part[first] == part]], 2].mean() for part in mesh.part[first]}

@@ -18,8 +18,9 @@ def held_components(mesh: MeshData, rules: Mapping[str, Sequence[int]] = HELD) -
     """Return whether each displacement component of each node is fixed, shape (n, 3).
 
     Args:
-        mesh: The mesh.
-        rules: Facet set -> its fixed components (0, 1, 2 for x, y, z); sets that the mesh lacks fix nothing.
+        mesh: The mesh, n nodes.
+        rules: Facet set -> its fixed components (0, 1, 2 for x, y, z); sets that the mesh lacks fix nothing. By default
+            mounting holes and symmetry planes x = 0 and y = 0.
     """
     held = np.zeros((len(mesh.points), 3), dtype=bool)
     for name, components in rules.items():

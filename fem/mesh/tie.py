@@ -63,12 +63,17 @@ class Tie:
 
 
 def tie_joints(mesh: MeshData) -> tuple[MeshData, Tie, float]:
-    """Tie the ends of all joints: ``foot@..`` to ``board_side``, ``head@..`` to ``package_side``.
+    """Tie the ends of all joints: facet sets ``foot@..`` to ``board_side``, ``head@..`` to ``package_side``.
 
-    Likewise, non-matching layers are tied: ``slave@..`` to ``master@..`` of the same name.
+    Likewise, non-matching layers are tied: ``slave@..`` to ``master@..`` of the same name. The displacement of a slave
+    node is interpolated between the four nodes of a master facet.
+
+    Args:
+        mesh: Mesh with these facet sets; without them it is returned unchanged, with an empty tie.
 
     Returns:
-        The mesh with its slaves moved onto their facets, the tie, and the largest such move [m].
+        The mesh with its slaves moved onto their facets, the tie (slaves, their masters and weights), and the largest
+        such move [m].
 
     Raises:
         TieError: The mesh has joints but no hexahedra, or a node has no facet within the tolerance, is tied twice, or
@@ -114,7 +119,11 @@ def _tie_end(mesh: MeshData, end: str, side: str) -> Tie:
 
 
 def bilinear(xi: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the shape functions of a quadrilateral at reference points xi (m, 2), shape (m, 4)."""
+    """Return the shape functions of quadrilaterals at reference points, shape (m, 4), nodes in cyclic order.
+
+    Args:
+        xi: Reference points from -1 to 1, shape (m, 2).
+    """
     return 0.25 * np.prod(1.0 + xi[:, None, :] * CORNERS, axis=2)
 
 
@@ -126,10 +135,15 @@ def _bilinear_derivatives(xi: NDArray[np.float64]) -> NDArray[np.float64]:
 def closest_facets(
     points: NDArray[np.float64], corners: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
-    """Find the quadrilateral (nf, 4, 3) that is closest to each point (m, 3).
+    """Find the quadrilateral that is closest to each point.
+
+    Args:
+        points: Points, shape (m, 3) [m].
+        corners: Corners of the quadrilaterals in cyclic order, shape (nf, 4, 3) [m].
 
     Returns:
-        Facet of each point (m,), reference coordinates of its closest point (m, 2), and distance (m,) [m].
+        Facet of each point, shape (m,); reference coordinates of its closest point, from -1 to 1, shape (m, 2); and
+        distance, shape (m,) [m].
     """
     from scipy.spatial import cKDTree  # imported late to keep the start-up of plans fast
 
@@ -146,10 +160,14 @@ def closest_facets(
 def project(
     points: NDArray[np.float64], corners: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Project each point (m, 3) onto its quadrilateral (m, 4, 3) by Gauss-Newton, clipped to the inside.
+    """Project each point onto its own quadrilateral by Gauss-Newton iterations, clipped to the inside.
+
+    Args:
+        points: Points, shape (m, 3) [m].
+        corners: Corners of the quadrilateral of each point in cyclic order, shape (m, 4, 3) [m].
 
     Returns:
-        Reference coordinates (m, 2) and distances (m,) [m].
+        Reference coordinates from -1 to 1, shape (m, 2), and distances, shape (m,) [m].
     """
     xi = np.zeros((len(points), 2))
     for _ in range(NEWTON_STEPS):
@@ -165,6 +183,10 @@ def project(
 
 def check_tie(tie: Tie, points: NDArray[np.float64]) -> None:
     """Check a tie on its points: partition of unity, linear fields, net force and moment of unit forces.
+
+    Args:
+        tie: Slaves, masters and weights.
+        points: Nodes of the mesh, with the slaves on their facets, shape (n, 3) [m].
 
     Raises:
         TieError: One of them is not exact to 1e-12.
@@ -189,5 +211,10 @@ def check_tie(tie: Tie, points: NDArray[np.float64]) -> None:
 
 
 def net_load(points: NDArray[np.float64], force: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the net force [N] and moment about the origin [N m] of forces (n, 3) at points (n, 3), shape (6,)."""
+    """Return the net force [N] and net moment about the origin [N m] of point forces, shape (6,), force first.
+
+    Args:
+        points: Points of action, shape (n, 3) [m].
+        force: Force at each point, shape (n, 3) [N].
+    """
     return np.concatenate([force.sum(axis=0), np.cross(points, force).sum(axis=0)])

@@ -65,7 +65,11 @@ class WatchTable:
 
 
 def joint_names(mesh: MeshData) -> tuple[str, ...]:
-    """Return the names of the joints, which follow ``solder@`` in part names, in the order of the mesh."""
+    """Return the names of the joints in the order of the mesh's part names; empty without joints.
+
+    Args:
+        mesh: Mesh in which the solder of a joint is the part ``solder@<joint>``.
+    """
     return tuple(name.split("@")[1] for name in mesh.part_names if name.startswith("solder@"))
 
 
@@ -79,7 +83,8 @@ def _footprint(mesh: MeshData) -> NDArray[np.float64]:
 def centre_nodes(mesh: MeshData) -> NDArray[np.int64]:
     """Return the nodes nearest to the axis x = y = 0 on the board's lower face and the die's upper face, shape (2,).
 
-    A node is -1 if the mesh has no such part.
+    Args:
+        mesh: Mesh of package and board; a node is -1 if the mesh has no such part.
     """
     board = mesh.facet_nodes("board_bottom")
     die = np.unique(mesh.cells[mesh.in_parts("die".__eq__)])
@@ -95,10 +100,10 @@ def _nearest_to_axis(points: NDArray[np.float64], nodes: NDArray[np.integer]) ->
 
 
 def whole_watch(mesh: MeshData, thickness: float) -> WatchTable:
-    """Return the watch table of a whole mesh.
+    """Return the watch table of a whole mesh: nodes, pad faces and layers whose histories are recorded.
 
     Args:
-        mesh: Whole mesh.
+        mesh: Whole mesh of board, package and joints.
         thickness: Thickness of the layers at the pads over which stress and plastic flow are averaged [m].
 
     Raises:

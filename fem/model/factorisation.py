@@ -63,7 +63,11 @@ class Factorisation:
 
 
 def make_direct(solver: PETSc.KSP) -> None:
-    """Configure a PETSc linear solver (in place) as one MUMPS Cholesky factorisation without iterations."""
+    """Configure a PETSc linear solver as one MUMPS Cholesky factorisation without iterations.
+
+    Args:
+        solver: Solver whose matrix is symmetric; changed in place, before its set-up.
+    """
     for number, value in SETTINGS.items():  # MUMPS 5.5 under PETSc 3.18 takes them as options only
         PETSc.Options()[f"{PREFIX}mat_mumps_icntl_{number}"] = value
     solver.setOptionsPrefix(PREFIX)

@@ -189,7 +189,11 @@ class SubsteppedElements:
 
 
 def levels_of(terms: Sequence[InternalForce]) -> list[SubsteppedElements]:
-    """Return those of the force terms that take local time steps (``SubsteppedElements``), in the same order."""
+    """Return those of the force terms that take local time steps (several substeps in one step), in the same order.
+
+    Args:
+        terms: Force terms of a model; the result is empty if none has substeps.
+    """
     return [term for term in terms if isinstance(term, SubsteppedElements)]
 
 

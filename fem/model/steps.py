@@ -72,8 +72,11 @@ def steps_of_division(whole: Whole, survey: Survey, division: Division, rules: R
     Args:
         whole: Mesh of both models with its ties.
         survey: Role, mass and critical step of each element of the mesh.
-        division: Cells of each model, step levels and windows.
+        division: Cells of each model, step levels and windows (times between two exchanges of the models).
         rules: Settings of the division, with the damping.
+
+    Returns:
+        Windows and substeps, with the critical steps [s] and masses [kg] behind them.
     """
     critical = damped_critical_step(survey.step, rules.stiffness)
     _, _, slow, _ = next(steps_of(whole, survey, division, rules))
@@ -118,10 +121,10 @@ def assembled_step(
 
     Args:
         comm: Communicator of the model.
-        rank_elements: Elements of the rank.
-        tables: Tables of the model.
-        mass_factor: Factor on the density of each element, shape (ne,).
-        beddings: Elastic supports on this rank.
+        rank_elements: Elements of this rank.
+        tables: Parts, ties, supports and step levels of the model, equal on all ranks.
+        mass_factor: Factor on the density of each of this rank's elements, shape (ne,).
+        beddings: Elastic supports on this rank; may be empty.
     """
     body = make_body(comm, rank_elements, tables, mass_factor, None)
     highest = highest_frequency(comm, body, [*body.terms, *beddings], body.mass)
@@ -167,6 +170,10 @@ def explicit_steps(comm: MPI.Comm, rank_elements: RankElements, dynamics: Dynami
         comm: Communicator of the model.
         rank_elements: Elements of this rank with their critical steps.
         dynamics: Settings of the dynamics: duration, damping, steps and roles with mass scaling.
+
+    Returns:
+        Steps with critical steps [s] and masses [kg], equal on all ranks, and the density factors of this rank's
+        elements.
     """
     scaled = dynamics.numerics.mass_scaled
     target = find_minimum(comm, [rank_elements.steps[~np.isin(rank_elements.roles, scaled)]])

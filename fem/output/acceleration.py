@@ -55,9 +55,14 @@ class Acceleration:
 
 
 def apply_low_pass(values: NDArray[np.float64], step: float, low_pass: LowPass) -> NDArray[np.float64]:
-    """Return samples, shape (n,), at equal steps [s], filtered forwards and backwards.
+    """Return samples filtered forwards and backwards, so that the phase is unchanged, shape (n,).
 
     The record is extended at both ends by its mirror image at the end point, over two periods of the corner frequency.
+
+    Args:
+        values: Samples at equal steps, shape (n,).
+        step: Sampling step [s].
+        low_pass: Filter with its order and corner frequency.
 
     Raises:
         ValueError: The step is above half a period of the corner frequency.
@@ -72,20 +77,43 @@ def apply_low_pass(values: NDArray[np.float64], step: float, low_pass: LowPass) 
 
 
 def is_sampled(time: NDArray[np.float64], low_pass: LowPass) -> bool:
-    """Return whether equal sample times, shape (n,) [s], are dense and long enough to apply a low-pass filter."""
+    """Return whether equal sample times are dense and long enough to apply a low-pass filter.
+
+    There must be at least ``RATE`` samples in a period of the corner frequency, and more than ``RATE`` in all.
+
+    Args:
+        time: Sample times, shape (n,) [s].
+        low_pass: Filter with its corner frequency [Hz].
+    """
     step = float(time[-1] - time[0]) / max(len(time) - 1, 1)
     return len(time) > RATE and step * RATE * low_pass.frequency <= 1.0 + 1e-9
 
 
 def acceleration(time: NDArray[np.float64], displacement: NDArray[np.float64], low_pass: LowPass) -> Acceleration:
-    """Return the acceleration from absolute displacements, shape (n,) [m], at equally spaced times, shape (n,) [s]."""
+    """Return the raw and filtered acceleration [m/s^2] at a point along one direction, by second differences.
+
+    Args:
+        time: Equally spaced sample times, shape (n,) [s].
+        displacement: Absolute displacement along the direction, shape (n,) [m].
+        low_pass: Filter of the acceleration.
+
+    Returns:
+        Acceleration at the n - 2 inner times.
+
+    Raises:
+        ValueError: The samples are too sparse for the filter.
+    """
     step = float(time[-1] - time[0]) / (len(time) - 1)
     raw = np.diff(displacement, n=2) / step**2
     return Acceleration(time[1:-1], raw, apply_low_pass(raw, step, low_pass))
 
 
 def peaks_of(accelerations: Mapping[str, Acceleration], low_pass: LowPass) -> dict[str, dict[str, Any]]:
-    """Return the peaks of named accelerations and their filter as metrics; empty without accelerations.
+    """Return the peaks of named accelerations and their filter as metrics.
+
+    Args:
+        accelerations: Name of a point -> its acceleration; if empty, so is the result.
+        low_pass: Filter of the accelerations, for its label.
 
     Returns:
         ``peak_acceleration@<name>`` and ``second_peak_acceleration@<name>`` (largest later peak of opposite sign) [G],
@@ -116,10 +144,16 @@ def watch_accelerations(
 ) -> dict[str, Acceleration]:
     """Return the absolute acceleration of each watch point of a structure; empty if samples are too sparse.
 
+    It acts along the direction of the watch point, else of the first input acceleration, else along the axis with the
+    largest range of displacement.
+
     Args:
-        arrays: Arrays of the history by name.
-        problem: Input of the structure.
-        pulses: Pulse of each load.
+        arrays: Arrays of the history by name: ``time``, shape (n,) [s], and ``displacement@<name>``, shape (n, 3) [m].
+        problem: Input of the structure, with watch points, loads and filter.
+        pulses: Name of a load -> its pulse over time.
+
+    Returns:
+        Name of a watch point -> raw and filtered acceleration [m/s^2].
     """
     time, low_pass = arrays["time"], problem.dynamics.filter
     if not is_sampled(time, low_pass):
@@ -144,10 +178,14 @@ def drop_accelerations(
     """Return the absolute accelerations of package centre and watch points in a drop; empty if samples are too sparse.
 
     Args:
-        arrays: Arrays of the history by name; displacements are relative to the drop table.
+        arrays: Arrays of the history by name: ``time``, shape (n,) [s], ``die_centre`` and ``displacement@<name>``,
+            shape (n, 3) [m]; displacements are relative to the drop table.
         pulse: Acceleration of the drop table [m/s^2].
         low_pass: Filter of the accelerations.
-        watch: Watch points; a point without a direction uses the direction of the table's motion.
+        watch: Name -> watch point; one without a direction uses the direction of the table's motion.
+
+    Returns:
+        ``package`` (if the die moves) or name of a watch point -> raw and filtered acceleration [m/s^2].
     """
     time = arrays["time"]
     if not is_sampled(time, low_pass):

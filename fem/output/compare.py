@@ -12,19 +12,26 @@ COMPARED = {"die_displacement": "die_centre", "board_displacement": "board_centr
 
 
 def relative_error(values: NDArray[np.float64], reference: NDArray[np.float64]) -> float:
-    """Return the relative L2 error over all entries, |values - reference| / |reference|, of arrays of equal shape."""
+    """Return the relative L2 error over all entries, |values - reference| / |reference|.
+
+    If the reference is zero, the absolute norm |values| is returned.
+
+    Args:
+        values: Array of any shape.
+        reference: Array of the same shape.
+    """
     scale = float(np.linalg.norm(reference))
     return float(np.linalg.norm(values - reference)) / scale if scale > 0.0 else float(np.linalg.norm(values))
 
 
 def compare_histories(two_scale: Path, dns: Path, fine: Collection[str] | None = None) -> dict[str, float | str]:
-    """Compare the ``history.npz`` files of a two-scale run and a DNS.
+    """Compare the ``history.npz`` files of a two-scale run and a DNS (one model without scales).
 
     If the DNS ends early, only its duration is compared, and the two-scale run determines the critical joint.
 
     Args:
-        two_scale: History file of the two-scale run.
-        dns: History file of the reference.
+        two_scale: History file of the two-scale run, read only.
+        dns: History file of the reference, read only.
         fine: Fine joints of the two-scale run, None if all are fine.
 
     Returns:

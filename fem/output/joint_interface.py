@@ -23,6 +23,8 @@ from reflowshock.fem.parallel.rank_activity import ACTIVITY
 def picture_windows(times: Iterable[float], plan: WindowPlan) -> frozenset[int]:
     """Return the numbers of the windows whose ends are closest to some times [s].
 
+    A window is the time between two exchanges of macro and meso model, or a step of a single model; 0 is the start.
+
     Args:
         times: Times of pictures [s]; times after the last window are skipped.
         plan: Size and number of the windows.

@@ -18,7 +18,8 @@ def point_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
     """Return the peaks at watch points and supports as metrics, each as ``{"value": ..., "unit": ...}``.
 
     Args:
-        arrays: Arrays of ``history.npz`` by name.
+        arrays: Arrays of ``history.npz`` by name, with the histories of watch points and supports; empty result without
+            any.
 
     Returns:
         For each watch point ``peak_displacement@<name>``, ``displacement_range@<name>`` [m], ``peak_strain@<name>``,
@@ -43,7 +44,11 @@ def point_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
 
 
 def gauge_lengths(table: PointTable) -> dict[str, float]:
-    """Return the length of each strain gauge [m]."""
+    """Return the length of each strain gauge by name [m].
+
+    Args:
+        table: Watch points with their strain gauges; the result is empty without gauges.
+    """
     return dict(zip(table.gauges.names, table.gauges.length.tolist(), strict=True))
 
 
@@ -75,7 +80,15 @@ def gauge_metrics(arrays: Mapping[str, NDArray], low_pass: LowPass) -> dict[str,
 
 
 def mode_metrics(modes: ModeTable | None) -> dict[str, Any]:
-    """Return the lowest natural frequencies [Hz] as ``first_frequency`` to ``fourth_frequency``; empty for None."""
+    """Return the four lowest natural frequencies as metrics.
+
+    Args:
+        modes: Table of modes, None if no modes were computed.
+
+    Returns:
+        ``first_frequency`` to ``fourth_frequency``, each as ``{"value": ..., "unit": "Hz"}``; fewer if there are fewer
+        modes, empty for None.
+    """
     frequencies = [] if modes is None else modes.frequency.tolist()
     names = ("first", "second", "third", "fourth")
     return {f"{name}_frequency": quantity(value, "Hz") for name, value in zip(names, frequencies, strict=False)}

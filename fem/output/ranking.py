@@ -49,24 +49,39 @@ OUTER_FIBRE = Measure("outer_fibre", "outer-fibre stress", "Pa")
 
 
 def ranking_measure(arrays: Arrays) -> Measure:
-    """Return the ranking measure: plastic work density if any solder has yielded, otherwise peel stress.
+    """Return the measure by which joints are ranked: plastic work density if any solder has yielded, else peel stress.
 
     Args:
-        arrays: Arrays of ``history.npz``: ``peel_<end>`` and, with plasticity, ``plastic_work_<end>`` for the ends
+        arrays: Arrays of ``history.npz``: ``peel_<end>`` [Pa] and, with plasticity, ``plastic_work_<end>`` for the ends
             ``board`` and ``package``, each of shape (times, joints).
+
+    Returns:
+        Measure with methods that return its histories and peaks from such arrays.
     """
     yielded = "plastic_work_board" in arrays and bool(PLASTIC_WORK.peaks(arrays).max(initial=0.0) > 0.0)
     return PLASTIC_WORK if yielded else PEEL
 
 
 def rank_joints(arrays: Arrays) -> NDArray[np.intp]:
-    """Return the joint numbers, critical joint first and ties by peel stress, shape (joints,).
+    """Return the joint numbers, critical joint first, shape (joints,).
 
-    ``arrays`` is as in ``ranking_measure``.
+    They are ordered by the peak of plastic work density if any solder has yielded, else of peel stress; equal peaks of
+    work are ordered by peel stress.
+
+    Args:
+        arrays: Arrays of ``history.npz``: ``peel_<end>`` [Pa] and, with plasticity, ``plastic_work_<end>`` for the ends
+            ``board`` and ``package``, each of shape (times, joints).
     """
     return np.lexsort((-PEEL.peaks(arrays), -ranking_measure(arrays).peaks(arrays)))
 
 
 def critical_joint(arrays: Arrays) -> int:
-    """Return the index of the critical joint, the first of ``rank_joints``; ``arrays`` as in ``ranking_measure``."""
+    """Return the index of the critical joint.
+
+    It has the largest peak of plastic work density if any solder has yielded, else of peel stress.
+
+    Args:
+        arrays: Arrays of ``history.npz``: ``peel_<end>`` [Pa] and, with plasticity, ``plastic_work_<end>`` for the ends
+            ``board`` and ``package``, each of shape (times, joints).
+    """
     return int(rank_joints(arrays)[0])

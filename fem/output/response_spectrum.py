@@ -8,7 +8,12 @@ PER_OCTAVE = 12
 
 
 def spectrum_frequencies(low: float, high: float) -> NDArray[np.float64]:
-    """Return frequencies from ``low`` to ``high`` [Hz], twelve per octave."""
+    """Return frequencies in a constant ratio, twelve per octave, in ascending order, shape (k,) [Hz].
+
+    Args:
+        low: First frequency [Hz].
+        high: Largest frequency [Hz]; the last one may be slightly below it.
+    """
     return low * 2.0 ** (np.arange(int(PER_OCTAVE * np.log2(high / low)) + 1) / PER_OCTAVE)
 
 

@@ -99,7 +99,14 @@ class Report(Protocol):
 
 
 def write_result(comms: Communicators, report: Report, outcome: Outcome[Any], timings: Timings) -> None:
-    """Write ``history.npz`` and ``result.json`` on rank 0; collective."""
+    """Write ``history.npz`` and ``result.json`` to the output folder on rank 0; collective.
+
+    Args:
+        comms: Communicators of the run and of its models.
+        report: Problem-specific part of ``result.json``, with the input and its output folder.
+        outcome: Results of the run: models, steps, history and peaks.
+        timings: Wall-clock times [s].
+    """
     summary, output = report.summary(comms, outcome), report.request.output
     if comms.world.rank == 0:
         outcome.history.write(output)
@@ -113,12 +120,24 @@ def write_result(comms: Communicators, report: Report, outcome: Outcome[Any], ti
 
 
 def quantity(value: Any, unit: str = "") -> dict[str, Any]:
-    """Return a metric for ``result.json``, ``{"value": value, "unit": unit}``; an empty unit means dimensionless."""
+    """Return a metric for ``result.json``, ``{"value": value, "unit": unit}``.
+
+    Args:
+        value: Number or text that JSON can store.
+        unit: Unit of the value; empty for dimensionless numbers and texts.
+    """
     return {"value": value, "unit": unit}
 
 
 def model_summary(comms: Communicators, steps: Steps, mode: str) -> dict[str, Any]:
     """Return mode, ranks, time steps and masses of a run.
+
+    A window is the time between two exchanges of macro and meso model, or a step of a single model.
+
+    Args:
+        comms: Communicators of the run and of its models.
+        steps: Time steps and masses.
+        mode: Name of the mode, returned unchanged.
 
     Returns:
         ``mode`` (as given), ``ranks`` (count), ``placement`` (name), ``critical_steps`` (material role -> step [s]),
@@ -158,7 +177,7 @@ def sizes(comms: Communicators, models: Mapping[Role, Model[Any]]) -> tuple[dict
 
 
 def peak_memory() -> int:
-    """Return the peak memory of this process so far [B]."""
+    """Return the peak memory of this process, from its start until now [B]; each rank has its own."""
     return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
@@ -173,7 +192,9 @@ def health(
         more: Additional checks, name -> (value, limit).
 
     Returns:
-        Checks as in ``make_checks``.
+        Name -> ``{"value", "limit", "ok"}``, where ``ok`` means that the value is at most the limit. Names are
+        ``energy_balance_error``, those of ``more``, ``added_mass_fraction`` and, for hexahedra with hourglass energy,
+        ``hourglass_energy_fraction``.
     """
     balance, steps = outcome.history.balance, outcome.steps
     checks = {
@@ -196,5 +217,9 @@ def _hourglass_check(history: History, formulation: str) -> dict[str, tuple[floa
 
 
 def make_checks(checks: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
-    """Return checks, name -> (value, limit), as name -> ``{"value", "limit", "ok"}``; ``ok``: value at most limit."""
+    """Return health checks for ``result.json``: name -> ``{"value", "limit", "ok"}``.
+
+    Args:
+        checks: Name -> (value, limit); ``ok`` is true if the value is at most the limit.
+    """
     return {name: {"value": value, "limit": limit, "ok": value <= limit} for name, (value, limit) in checks.items()}

@@ -17,11 +17,12 @@ SMALL = 0.1  # fraction of the largest deflection below which a zero crossing do
 def is_settled(history: Arrays) -> bool:
     """Return whether the largest stress of all joints occurred more than half an oscillation of the board ago.
 
-    Half an oscillation is the time from the start to the first zero crossing of the board centre. It is at least half
-    the period of the first mode, since it includes the pulse.
+    Then a run may end early. Half an oscillation is the time from the start to the first zero crossing of the board
+    centre. It is at least half the period of the first mode, since it includes the pulse.
 
     Args:
-        history: Arrays named in ``WATCHED``: times (k,) [s], board centre (k, 3) [m], stresses (k, joints) [Pa].
+        history: Arrays named in ``WATCHED``: ``time``, shape (k,) [s], ``board_centre``, shape (k, 3) [m], and for the
+            ends ``board`` and ``package`` the stresses, shape (k, joints) [Pa], and plastic work of the joints.
     """
     time, half = history["time"], half_oscillation(history["time"], history["board_centre"][:, 2])
     if half is None or not PEEL.worse(history).size:
@@ -33,13 +34,19 @@ def is_settled(history: Arrays) -> bool:
 def settling_measures(history: Arrays) -> tuple[Measure, ...]:
     """Return the measures of the joints whose peaks must have passed before a run may end early.
 
-    ``history`` is as in ``is_settled``.
+    They are peel stress and, unless solder has yielded, von Mises stress.
+
+    Args:
+        history: Arrays of ``history.npz``: ``peel_<end>`` [Pa] and, with plasticity, ``plastic_work_<end>`` for the
+            ends ``board`` and ``package``, each of shape (times, joints).
     """
     return (PEEL,) if ranking_measure(history) is PLASTIC_WORK else (PEEL, VON_MISES)
 
 
 def half_oscillation(time: NDArray[np.float64], deflection: NDArray[np.float64]) -> float | None:
     """Return the time of the first sign change of a deflection [s], or None if its sign has not changed yet.
+
+    Sign changes of deflections that are small compared to the largest one of the record do not count.
 
     Args:
         time: Sample times, shape (k,) [s].

@@ -37,16 +37,19 @@ class ModeTable:
 
 
 def find_modes(comm: MPI.Comm, model: StructureModel, mass: float, request: StructureInput) -> ModeTable:
-    """Compute and write the natural modes of a structure; collective.
+    """Compute the natural modes of a structure, and write ``modes.json`` and the shapes ``modes.pvd``; collective.
 
     Args:
         comm: Communicator of all ranks.
-        model: Model of the structure.
+        model: Model of the structure on this rank.
         mass: Mass of the structure [kg].
-        request: Input of the run.
+        request: Input of the run, with the number of modes and the output folder.
+
+    Returns:
+        Natural frequencies [Hz] and fractions of the mass along x, y, z, in ascending order of frequency.
 
     Raises:
-        AgreedError: More modes are requested than there are equations; on every rank.
+        AgreedError: More modes are requested than there are equations, or too few converged; on every rank.
     """
     body = _at_rest_supports(model, request)
     try:
@@ -72,7 +75,15 @@ def _at_rest_supports(model: StructureModel, request: StructureInput) -> Body:
 
 
 def write_modes(folder: Path, table: ModeTable) -> None:
-    """Write the table of modes as ``modes.json`` into a folder."""
+    """Write the table of modes as ``modes.json`` into a folder; not collective.
+
+    The file is a list of dictionaries with ``mode`` (number from 1), ``frequency`` [Hz] and ``mass_fraction``, a
+    dictionary with the keys ``x``, ``y`` and ``z``.
+
+    Args:
+        folder: Existing folder.
+        table: Natural frequencies and mass fractions.
+    """
     (folder / "modes.json").write_text(json.dumps(_mode_rows(table), indent=1), encoding="utf-8")
 
 

@@ -70,6 +70,8 @@ class Checkpoint:
 def find_checkpoints(folder: Path, owner: str, preferred: Path) -> list[Checkpoint]:
     """Return the complete checkpoints of an owner in the subfolders of ``folder``, best first; nothing is written.
 
+    A checkpoint is complete if the state files of all ranks exist. Later windows come first, then the preferred folder.
+
     Args:
         folder: Folder with one subfolder for each input and partition.
         owner: Digest of the inputs to which a checkpoint must belong.
@@ -92,7 +94,11 @@ def find_checkpoints(folder: Path, owner: str, preferred: Path) -> list[Checkpoi
 
 
 def header_of(path: Path) -> Header | None:
-    """Return the header of a checkpoint file, or warn and return None if it has none."""
+    """Return the header of a checkpoint file, or print a warning and return None if it is not a checkpoint file.
+
+    Args:
+        path: File to be read.
+    """
     try:
         return Header(**read_header(path))
     except (NotData, TypeError) as error:
@@ -101,12 +107,18 @@ def header_of(path: Path) -> Header | None:
 
 
 def warn(message: str) -> None:
-    """Print a warning that the launcher displays."""
+    """Print a warning to standard output as a JSON line, ``{"warning": message}``, that the launcher displays."""
     print(json.dumps({"warning": message}), flush=True)
 
 
 def write_state(path: Path, header: Header, state: object) -> None:
-    """Write a header and a state, a tree of plain values and arrays, to the file ``path``."""
+    """Write a header and a state to a checkpoint file.
+
+    Args:
+        path: File to be written.
+        header: Header with owner, ranks, window and time.
+        state: Nested dictionaries of plain values and arrays.
+    """
     write_data(path, fields_of(header), state)
 
 

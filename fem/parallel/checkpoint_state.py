@@ -155,17 +155,29 @@ def _map_state(state: "State | Entry", change: Callable[[Entry], Any]) -> Any:
 
 
 def values(state: State) -> dict[str, Any]:
-    """Return a state as nested dictionaries of plain values without entries, the argument of ``restore``."""
+    """Return a state with each entry of its nested dictionaries replaced by a plain value, the argument of ``restore``.
+
+    Args:
+        state: State of this rank; its entries are values at nodes or cells, sums over ranks, or common values.
+    """
     return _map_state(state, lambda entry: entry.value)
 
 
 def blank(state: State) -> State:
-    """Return a state with empty entries for the same nodes and cells, to be filled by ``take``."""
+    """Return a state (nested dictionaries of entries) with empty entries for the same nodes and cells.
+
+    Args:
+        state: State of this rank, unchanged; ``take`` fills the result from the states of other partitions.
+    """
     return _map_state(state, lambda entry: entry.blank())
 
 
 def layout(state: State) -> str:
-    """Return a hexadecimal digest of the node and cell numbers of a state, equal only for equal partitions."""
+    """Return a hexadecimal digest of the node and cell numbers of a state, equal only for equal partitions.
+
+    Args:
+        state: State of this rank, nested dictionaries of entries.
+    """
     digest = hashlib.sha256()
     for entry in _leaves(state):
         digest.update(entry.layout)
@@ -176,7 +188,7 @@ def take(state: State, part: State, first: Collection[str]) -> None:
     """Merge the state of one rank of another partition into the state of this rank.
 
     Args:
-        state: State of this rank, created by ``blank``.
+        state: State of this rank, nested dictionaries of entries created by ``blank``; changed in place.
         part: State of the other rank; missing names are skipped.
         first: Names in ``state`` that no lower rank has.
     """
@@ -194,5 +206,9 @@ def _merge(node: "State | Entry", part: Any, first: bool) -> None:
 
 
 def is_complete(state: State) -> bool:
-    """Return whether all rows of a state have been filled."""
+    """Return whether all rows of a state have been filled, i.e. none is NaN.
+
+    Args:
+        state: State of this rank, created by ``blank`` and filled by ``take``.
+    """
     return not any(isinstance(entry, Rows) and np.isnan(entry.value).any() for entry in _leaves(state))

@@ -57,7 +57,12 @@ class LocalMesh:
 
 
 def positions(haystack: NDArray[np.integer], needles: NDArray[np.integer]) -> NDArray[np.int32]:
-    """Return the index of each needle, shape (k,), in unique numbers in any order, shape (n,), or -1 if missing."""
+    """Return the index in ``haystack`` of each needle, -1 if it is missing, in the shape of ``needles``.
+
+    Args:
+        haystack: Unique numbers in any order, shape (n,).
+        needles: Numbers to be looked up, shape (k,).
+    """
     if not len(haystack):
         return np.full(np.shape(needles), -1, np.int32)
     order = np.argsort(haystack)
@@ -72,6 +77,9 @@ def distribute(comm: MPI.Comm, data: MeshData | None, ranks: NDArray[np.int32] |
         comm: Communicator of the model.
         data: Mesh on rank 0, None on other ranks.
         ranks: Rank of each cell on rank 0, shape (ne,); None lets DOLFINx partition the mesh.
+
+    Returns:
+        Cells of this rank with all their nodes, in local numbers, and the maps to input numbers.
     """
     nodes = comm.bcast(data.shape.nodes if data else None)
     points = data.points if data else np.empty((0, 3))

@@ -14,5 +14,9 @@ OTHER_MPI_JOB = (
 
 
 def without_mpi_job(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return a copy of environment variables without those of an MPI job, so that a child can start its own job."""
+    """Return a copy of environment variables without those of an MPI job, so that a child can start its own job.
+
+    Args:
+        environment: Variable name -> value, such as ``os.environ``; unchanged.
+    """
     return {name: value for name, value in environment.items() if not name.startswith(OTHER_MPI_JOB)}

@@ -12,13 +12,22 @@ SAMPLES = 10  # in a period of the filter's corner
 
 
 def attachment_problems(problem: StructureProblem) -> Iterator[Problem]:
-    """Yield the problems of a structure's supports, lumped masses, watch points and gauges."""
+    """Yield the input errors of a structure's supports, lumped masses, watch points and gauges; none if all are valid.
+
+    Args:
+        problem: Parameters of the structure; no mesh is needed.
+    """
     yield from fitting_problems(problem.fittings, problem.structure)
     yield from _elastic(problem)
 
 
 def fitting_problems(fittings: Fittings, body: Structure) -> Iterator[Problem]:
-    """Yield the problems of supports, lumped masses, watch points and gauges on a body."""
+    """Yield the input errors of supports, lumped masses, watch points and gauges on a body; none if all are valid.
+
+    Args:
+        fittings: Fittings of the input, by name.
+        body: Box with its facet sets and holes on which they must lie.
+    """
     for name, support in fittings.supports.items():
         yield from unknown_name(f"supports.{name}.on", support.on, body.facet_sets, "facet set")
         yield from _support(f"supports.{name}", support)
@@ -34,7 +43,14 @@ def fitting_problems(fittings: Fittings, body: Structure) -> Iterator[Problem]:
 
 
 def filter_problems(table: str, low_pass: LowPass, duration: float, samples: int) -> Iterator[Problem]:
-    """Yield a filter without its corner, or with a corner too high for the number of samples over a duration [s]."""
+    """Yield an input error for a filter without its corner, or for a corner too high for the history samples.
+
+    Args:
+        table: Table of the case file that has the filter, for the key of the error.
+        low_pass: Filter of accelerations and strains.
+        duration: Simulated time [s].
+        samples: Number of history samples.
+    """
     if low_pass.kind == "butterworth" and low_pass.corner is None:
         yield Problem(f"{table}.filter.corner", "is missing: the -3 dB of a Butterworth filter", None, "> 0 Hz")
     elif low_pass.kind == "cfc" and low_pass.corner is not None:
@@ -116,7 +132,13 @@ def _mass(key: str, mass: PointMass, structure: Structure) -> Iterator[Problem]:
 
 
 def position_problems(key: str, point: tuple[float, float, float], structure: Structure) -> Iterator[Problem]:
-    """Yield a problem if a point [m] lies outside the meshed box."""
+    """Yield an input error if a point lies outside the meshed box.
+
+    Args:
+        key: Key of the point in the case file.
+        point: Coordinates [m].
+        structure: Structure with its box.
+    """
     low, high = structure.corners
     nearest = [min(max(x, a), b) for x, a, b in zip(point, low, high, strict=True)]
     distance = math.dist(point, nearest)
@@ -126,7 +148,13 @@ def position_problems(key: str, point: tuple[float, float, float], structure: St
 
 
 def hole_problems(key: str, point: tuple[float, float, float], structure: Structure) -> Iterator[Problem]:
-    """Yield a problem if a point [m] lies inside a mounting hole."""
+    """Yield an input error if a point lies inside a mounting hole.
+
+    Args:
+        key: Key of the point in the case file.
+        point: Coordinates [m].
+        structure: Structure with its holes.
+    """
     holes = structure.holes
     if holes is None:
         return

@@ -14,12 +14,13 @@ NEGLIGIBLE_STRAIN = 1e-4  # at most a tenth of the strains in board-level tests
 
 
 def finite_rotation(table: str, kinematics: Kinematics, neglected_strain: float | None = None) -> tuple[bool, str]:
-    """Return whether rotations are finite, and the reason as text.
+    """Return whether rotations are finite (any kinematics but "small"), and the reason as text.
 
     Args:
         table: Table of the case file that has the key ``kinematics``.
         kinematics: Value of that key.
-        neglected_strain: Largest strain that the kinematics neglected in a run; None before a run.
+        neglected_strain: Largest strain that the kinematics neglected in a run, which is added to the reason; None
+            before a run.
     """
     turns, why = kinematics != "small", f"{table}.kinematics = {kinematics}"
     if kinematics != "finite" and neglected_strain is not None:

@@ -9,7 +9,14 @@ from reflowshock.problem import Problem
 
 
 def problems(shock: Shock) -> list[Problem]:
-    """Return the contradictions between parameters of a drop shock, empty if there are none; nothing is computed."""
+    """Return the contradictions between parameters of a drop shock, empty if there are none; nothing is computed.
+
+    Args:
+        shock: Parameters of the shock.
+
+    Returns:
+        Input errors, each with key, message, value and allowed range.
+    """
     return [
         *_pulse(shock),
         *_beyond_the_end(shock),

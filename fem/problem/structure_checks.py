@@ -26,7 +26,14 @@ COUPLING = "dynamics.coupling"
 
 
 def problems(problem: StructureProblem) -> list[Problem]:
-    """Return the contradictions between parameters of a structure, empty if there are none; nothing is computed."""
+    """Return the contradictions between parameters of a structure, empty if there are none; nothing is computed.
+
+    Args:
+        problem: Parameters of the structure.
+
+    Returns:
+        Input errors, each with key, message, value and allowed range.
+    """
     return [
         *_structure(problem),
         *attachment_problems(problem),
@@ -39,7 +46,10 @@ def problems(problem: StructureProblem) -> list[Problem]:
 
 
 def check(problem: StructureProblem) -> None:
-    """Raise an error if the parameters of a structure contradict each other.
+    """Raise an error if the parameters of a structure contradict each other; no mesh is needed.
+
+    Args:
+        problem: Parameters of the structure.
 
     Raises:
         ValueError: The message lists all contradictions, one per line.

@@ -126,6 +126,9 @@ def problems(thermal: Thermal, materials: Mapping[str, Material], warpage: float
         thermal: Temperature profile and effects.
         materials: Material of each role.
         warpage: Prescribed lift of the corner of the package [m].
+
+    Returns:
+        Input errors, each with key, message, value and allowed range; empty if there are none.
     """
     return [*_expansion(thermal, materials), *_warpage(thermal, warpage)]
 

@@ -49,7 +49,11 @@ class PackageDrop:
 
     @classmethod
     def read(cls, world: MPI.Comm, request: RunInput) -> "PackageDrop":
-        """Read and divide the meshes; collective; raises as ``run_dynamics``."""
+        """Read and divide the meshes; collective.
+
+        Raises:
+            AgreedError: The input or a mesh does not fit; on every rank.
+        """
         if request.coupled:
             check_size(request.shock.ranks, world.size)
         divided = divide_package(world, request)

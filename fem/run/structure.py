@@ -39,7 +39,11 @@ class StructureDynamics:
 
     @classmethod
     def read(cls, world: MPI.Comm, request: StructureInput) -> "StructureDynamics":
-        """Read the pulses, and divide the mesh of two coupled models; collective; raises as ``run_dynamics``."""
+        """Read the pulses, and divide the mesh of two coupled models; collective.
+
+        Raises:
+            AgreedError: The input or a mesh does not fit; on every rank.
+        """
         pulses = agreed(world, lambda: pulses_of(request.loads))
         return cls(request, divide_structure(world, request) if request.coupled else None, pulses)
 

@@ -88,7 +88,11 @@ class InitialState:
     def of(
         cls, cooling: Cooling, whole: Whole, inputs: Mapping[Role, ModelInput[TablesT_co]], path: bool
     ) -> "InitialState":
-        """Select the nodes of each model from the joined mesh; raises as ``Cooling.check``."""
+        """Select the nodes of each model from the joined mesh.
+
+        Raises:
+            MeshError: The residual stress was computed on another mesh.
+        """
         cooling.check(whole)
         displacement = {}
         for role, item in inputs.items():

@@ -123,7 +123,7 @@ def _flat(surfaces: Surfaces) -> list[int]:
 
 
 def write_heated_assembly(package: Package, board: Board, path: Path) -> dict[str, int]:
-    """Mesh board and package for a reflow simulation: as ``write_assembly``, with a coarser board.
+    """Mesh board and package for a reflow simulation: MSH 4.1 in metres, both flat, with a coarser board.
 
     A shock needs up to a hundred thousand board elements to resolve waves; a reflow only needs the motion of the pads.
     With two layers, and coarse cells away from the package, the gaps of hu_bga_drop differ by a tenth of a nanometre

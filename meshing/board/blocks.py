@@ -41,7 +41,7 @@ def plan_surfaces(plan: Plan, height: float, hole: RoundHole | None = None, reco
         recombine: Whether surfaces are meshed by quadrilaterals instead of triangles.
 
     Returns:
-        Block (i, j) -> surface tags: one, or four around a hole.
+        Block (i, j) -> Gmsh tags of its surfaces: one, or four around a hole. i counts intervals along x, j along y.
     """
     geo = gmsh.model.geo
     x, y = _breaks(plan.x), _breaks(plan.y)
@@ -71,7 +71,7 @@ def extrude(surfaces: Surfaces, thickness: float, elements: int, recombine: bool
     """Extrude surfaces of the current Gmsh model upwards, along z.
 
     Args:
-        surfaces: Block (i, j) -> surface tags.
+        surfaces: Block (i, j) -> Gmsh tags of its surfaces, as ``plan_surfaces`` returns them.
         thickness: Thickness of the extrusion [m].
         elements: Number of element layers.
         recombine: Whether volumes are meshed by hexahedra instead of tetrahedra.
@@ -130,7 +130,7 @@ def check_elements(name: str) -> None:
 
 
 def count_elements(volumes: Iterable[int]) -> int:
-    """Return the number of three-dimensional elements in volumes of the current Gmsh model, given by their tags."""
+    """Return the number of 3D elements in volumes of the current, meshed Gmsh model, given by their tags."""
     return sum(len(tags) for volume in volumes for tags in gmsh.model.mesh.getElements(3, volume)[1])
 
 

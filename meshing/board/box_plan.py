@@ -108,7 +108,11 @@ class Box:
 
 
 def box_plan(box: Box) -> Plan:
-    """Divide the box along x and y into intervals with equal cells, except for the squares around holes."""
+    """Divide the box along x and y into intervals with equal cells, except for the squares around holes.
+
+    Args:
+        box: Sizes, numbers of elements, symmetry and holes; only the meshed part (x, y >= 0 with symmetry) is divided.
+    """
     x, y = _axis(box, 0), _axis(box, 1)
     return Plan(x, y, blocks_at(box.holes.places, x, y) if box.holes else frozenset())
 
@@ -117,7 +121,7 @@ def count_box(box: Box) -> dict[str, PartEstimate]:
     """Count the elements of every layer exactly, and estimate the edge lengths of the smallest element.
 
     Returns:
-        Layer name -> number and sizes of its elements.
+        Layer name -> number of its elements, and edge lengths along x, y and z of the smallest box [m].
     """
     return {name: part for stack in box.stacks for name, part in _count_stack(stack).items()}
 
@@ -158,7 +162,11 @@ def _smallest_in_ring(box: Box, plan: Plan) -> float:
 
 
 def box_problems(box: Box) -> list[Problem]:
-    """Return the input errors of a box before it is meshed; keys refer to the table ``structure`` of a case file."""
+    """Return the input errors of a box before it is meshed; keys refer to the table ``structure`` of a case file.
+
+    Returns:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error; empty for a box that can be meshed.
+    """
     return [*_layer_problems(box), *_stack_problems(box), *_hole_problems(box)]
 
 

@@ -44,7 +44,12 @@ def problems(package: Package, board: Board, warpage: Warpage) -> list[Problem]:
 
 
 def hole_problems(package: Package, board: Board) -> Iterator[Problem]:
-    """Yield problems of mounting holes that cannot be meshed: beyond the board, near the package or each other."""
+    """Yield problems of mounting holes that cannot be meshed: beyond the board, near the package or each other.
+
+    Args:
+        package: Package, whose substrate the holes must not touch.
+        board: Sizes, mounting holes and symmetry of the board.
+    """
     return _hole_places(package, board) if _has_positions(board) else _holes(package, board)
 
 

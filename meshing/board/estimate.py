@@ -61,7 +61,8 @@ def count_elements(
         fine: Number of joints with a fine mesh; the others are coarse (``solder_coarse``). None: all are fine.
 
     Returns:
-        Part name -> number and sizes of its elements; parts without elements are omitted.
+        Part name -> number of its elements, and edge lengths along x, y and z of the smallest box [m]; parts without
+        elements are omitted.
     """
     joints = pad_table(package, board, warpage)
     count = len(joints) if fine is None else fine
@@ -219,7 +220,12 @@ def element_edge(package: Package, numerics: JointNumerics) -> float:
 
 
 def rim_count(pad: Pad, edge: float) -> int:
-    """Return the number of element rings of copper beyond the wetted disc of a pad, each about ``edge`` [m] wide."""
+    """Return the number of element rings of copper beyond the wetted disc of a pad, each about ``edge`` [m] wide.
+
+    Args:
+        pad: Radii of copper and wetted disc; 0 rings if they differ too little.
+        edge: Target width of a ring [m].
+    """
     if not has_rim(0.5 * pad.diameter, pad.wetted_radius):
         return 0
     return max(1, round((0.5 * pad.diameter - pad.wetted_radius) / edge))

@@ -156,7 +156,11 @@ class PackageSide:
 
 
 def underside(package: Package) -> float:
-    """Return the height of the undisplaced underside, or of its copper plate, above the board's top face [m]."""
+    """Return the height of the undisplaced underside, or of its copper plate, above the board's top face [m].
+
+    Args:
+        package: Package with its standoff (gap between the pads) and the thickness and kind of its copper.
+    """
     return package.standoff + (1 if package.copper.layout == "plate" else 2) * package.copper.thickness
 
 

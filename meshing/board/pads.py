@@ -134,7 +134,12 @@ def _pad_sizes(package: Package) -> tuple[float, float, float, float, float]:
 
 
 def has_rim(pad_radius: float, wetted_radius: float) -> bool:
-    """Return whether a copper pad is wide enough for a ring of elements beyond its wetted disc; radii in metres."""
+    """Return whether a copper pad is wide enough for a ring of elements beyond its wetted disc.
+
+    Args:
+        pad_radius: Radius of the copper [m].
+        wetted_radius: Radius of the disc that solder wets [m].
+    """
     return pad_radius > SMALLEST_RIM * wetted_radius
 
 
@@ -162,7 +167,11 @@ def write_pads(path: Path, sites: Iterable[PadSite]) -> None:
 
 
 def read_pads(path: Path) -> list[PadSite]:
-    """Read the pad sites that ``write_pads`` wrote, in the order of the file."""
+    """Read the pad sites that ``write_pads`` wrote, in the order of the file.
+
+    Returns:
+        Name, row and column, position of both pads, gap, radii [m] and tilt of each joint.
+    """
     pairs = ("offset", "tilt")
     return [
         PadSite(**record | {key: tuple(record[key]) for key in pairs})

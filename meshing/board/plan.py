@@ -62,8 +62,8 @@ class Plan:
 def board_plan(package: Package, board: Board) -> Plan:
     """Divide the board into footprint, margin, graded and coarse intervals along x and y, and squares around the holes.
 
-    Grid lines follow the footprint of the package and the margin of the meso model's patch. With quarter symmetry only
-    the positive halves of the axes are divided.
+    Blocks (i, j) are formed by interval i along x and j along y. Grid lines follow the footprint of the package and the
+    margin of the meso model's patch. With quarter symmetry only the positive halves of the axes are divided.
     """
     numerics, square = board.numerics, hole_square(board)
     half = (0.5 * package.substrate.length, 0.5 * package.substrate.width)
@@ -112,6 +112,9 @@ def package_plan(package: Package, board: Board) -> Plan:
 def package_axes(package: Package) -> tuple[tuple[Interval, ...], tuple[Interval, ...]]:
     """Divide the positive halves of the package's axes at the edges of the die, if it is smaller than the substrate.
 
+    Args:
+        package: Substrate, die and sizes of the elements.
+
     Returns:
         Intervals with graded cells along x and along y, from the centre to the edge of the substrate.
     """
@@ -125,7 +128,11 @@ def package_axes(package: Package) -> tuple[tuple[Interval, ...], tuple[Interval
 
 
 def hole_square(board: Board) -> float:
-    """Return the side of the squares around mounting holes that are meshed as O-grids, equal for all holes [m]."""
+    """Return the side of the squares around mounting holes that are meshed as O-grids, equal for all holes [m].
+
+    Args:
+        board: Diameter of the holes, and their distance from the nearest edge, which limits the squares.
+    """
     gaps = [math.inf]
     for (low, high), places in zip(board.ends, board.hole_lines, strict=True):
         gaps += [places[0] - low, high - places[-1]] if places else []
@@ -198,7 +205,7 @@ def blocks_within(plan: Plan, length: float, width: float) -> set[tuple[int, int
 
 
 def footprint(plan: Plan, package: Package) -> set[tuple[int, int]]:
-    """Return the blocks (i, j) of the board's plan under the package."""
+    """Return the blocks of the board's plan under the package: interval i along x, interval j along y."""
     return blocks_within(plan, package.substrate.length, package.substrate.width)
 
 

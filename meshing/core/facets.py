@@ -73,13 +73,13 @@ def cut_segments(points: np.ndarray, triangles: np.ndarray, height: float) -> np
 
 
 def section_area(segments: np.ndarray) -> float:
-    """Return the area enclosed by oriented segments (s, 2, 2) [m^2] (Green's theorem)."""
+    """Return the area enclosed by segments, start and end (x, y) of shape (s, 2, 2) [m], counter-clockwise [m^2]."""
     start, end = segments[:, 0], segments[:, 1]
     return 0.5 * float(np.sum(start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]))
 
 
 def section_centroid(segments: np.ndarray) -> np.ndarray:
-    """Return the centroid of the area enclosed by oriented segments (s, 2, 2), shape (2,) [m]."""
+    """Return the centroid (x, y) of the area in counter-clockwise segments, start and end of shape (s, 2, 2) [m]."""
     start, end = segments[:, 0], segments[:, 1]
     cross = start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]
     return ((start + end) * cross[:, None]).sum(axis=0) / (3.0 * cross.sum())

@@ -11,7 +11,10 @@ HEXAHEDRON, QUADRANGLE = 5, 3
 
 @contextmanager
 def gmsh_model(name: str) -> Iterator[None]:
-    """Open a fresh, silent Gmsh session with one empty model for a ``with`` statement, at whose end Gmsh is closed."""
+    """Open a fresh, silent Gmsh session with one empty model for a ``with`` statement, at whose end Gmsh is closed.
+
+    Sessions cannot be nested, since Gmsh has one session per process. The context yields None.
+    """
     gmsh.initialize(interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)

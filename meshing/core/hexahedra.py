@@ -20,7 +20,12 @@ CORNERS = np.array([[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1,
 
 
 def volumes(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """Return the volume of each trilinear hexahedron (c, 8), shape (c,) [m^3]; the 2 x 2 x 2 Gauss rule is exact."""
+    """Return the volume of each trilinear hexahedron (c, 8), shape (c,) [m^3]; the 2 x 2 x 2 Gauss rule is exact.
+
+    Args:
+        points: Node coordinates, shape (n, 3) [m].
+        cells: Nodes of the hexahedra, shape (c, 8): lower face counter-clockwise, then upper face (VTK's order).
+    """
     total = np.zeros(len(cells))
     for location in np.array(np.meshgrid(GAUSS, GAUSS, GAUSS)).reshape(3, -1).T:
         factors = 1.0 + CORNERS * location
@@ -34,6 +39,10 @@ def scaled_jacobian(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """Return the scaled Jacobian of each hexahedron (c, 8), shape (c,): 1 for a box, <= 0 if inverted.
 
     It is the smallest triple product of the unit edge vectors over the eight corners.
+
+    Args:
+        points: Node coordinates, shape (n, 3) [m].
+        cells: Nodes of the hexahedra, shape (c, 8): lower face counter-clockwise, then upper face (VTK's order).
     """
     corners = points[cells]
     edges = corners[:, CORNER_NEIGHBOURS] - corners[:, :, None, :]
@@ -45,13 +54,22 @@ def shortest_lengths(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """Return the volume over the largest face of each hexahedron (c, 8), shape (c,) [m].
 
     This length over the wave speed estimates the critical time step.
+
+    Args:
+        points: Node coordinates, shape (n, 3) [m].
+        cells: Nodes of the hexahedra, shape (c, 8): lower face counter-clockwise, then upper face (VTK's order).
     """
     faces = cells[:, FACES].reshape(-1, 4)
     return volumes(points, cells) / quad_areas(points, faces).reshape(-1, len(FACES)).max(axis=1)
 
 
 def quad_areas(points: np.ndarray, quads: np.ndarray) -> np.ndarray:
-    """Return the area of each plane quadrilateral (q, 4), half the cross product of its diagonals, (q,) [m^2]."""
+    """Return the area of each plane quadrilateral (q, 4), half the cross product of its diagonals, (q,) [m^2].
+
+    Args:
+        points: Node coordinates, shape (n, 3) [m].
+        quads: Nodes of the quadrilaterals in order around each, shape (q, 4).
+    """
     corners = points[quads]
     return 0.5 * np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=-1)
 

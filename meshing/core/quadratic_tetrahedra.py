@@ -44,7 +44,10 @@ def quadratic_tetrahedra(
         split: Hexahedra into which the tetrahedra were split.
         points: Smoothed node coordinates of these hexahedra, shape (n, 3) [m]; give the midpoints of surface edges.
         tetrahedra: Vertices of the tetrahedra, shape (c, 4).
-        faces: Facet set name -> surface triangles, shape (f, 3).
+        faces: Facet set name -> vertices of surface triangles, shape (f, 3).
+
+    Returns:
+        Nodes, ten-node tetrahedra in Gmsh's order, and six-node triangles of each facet set.
     """
     count = split.vertices + len(split.edges)
     cells = np.hstack([tetrahedra, split.middles(tetrahedra[:, EDGES])[:, ORDER]])
@@ -111,7 +114,12 @@ def curved_volume(points: np.ndarray, cells: np.ndarray) -> float:
 
 
 def corner_quality(points: np.ndarray, tetrahedra: np.ndarray) -> float:
-    """Return the smallest scaled Jacobian of straight tetrahedra (c, 4); 0.707 for a regular tetrahedron."""
+    """Return the smallest scaled Jacobian of straight tetrahedra: 0.707 if all are regular, <= 0 if one is inverted.
+
+    Args:
+        points: Vertices, shape (n, 3) [m].
+        tetrahedra: Vertices of the tetrahedra, shape (c, 4).
+    """
     corners = points[tetrahedra]
     smallest = np.inf
     for k in range(4):

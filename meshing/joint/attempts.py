@@ -75,7 +75,13 @@ def attempts(surface: ClosedSurface, numerics: JointNumerics, place: Placing) ->
 def free_form(surface: ClosedSurface, numerics: JointNumerics, place: Placing) -> Iterator[Attempt]:
     """Yield the meshing attempts that suit a body of any shape, best first: split tetrahedra of several sizes.
 
-    Arguments as in ``attempts``.
+    Args:
+        surface: Closed surface of the body, in its own frame.
+        numerics: Number of element layers, which gives the sizes.
+        place: Function that maps points of the body's own frame to the assembly, shape (n, 3) [m] both.
+
+    Yields:
+        Method with its settings and a function that meshes the body, not yet called, in order of preference.
     """
     element = 2.0 * pad_planes(surface).gap / numerics.layers
     for share in FREE_FORM_SIZES:
@@ -108,6 +114,10 @@ def first_valid_mesh(
         candidates: Meshing attempts in order of preference; no more of them are made than necessary.
         name: Name of the joint, for the message.
         build: Function that takes the meshed solder, moves it into the assembly and adds copper pads.
+
+    Returns:
+        Mesh whose record has method and settings of the attempt, ``standoff_error``, ``contact_area_error``,
+        ``shape_deviation`` [m], and ``tries``, the failed attempts with the reason in ``missed``.
 
     Raises:
         JointMeshError: All attempts fail; the message gives the reason of each.

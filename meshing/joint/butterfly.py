@@ -34,6 +34,9 @@ def butterfly(core: int, rings: int, opening: float = 1.0, beyond: int = 0) -> B
         rings: Number of rings around the core; with 0 the core fills the disc.
         opening: Radius that core and rings fill, relative to the unit circle.
         beyond: Number of further rings between this radius and the unit circle.
+
+    Returns:
+        Nodes, shape (n, 2), quadrilaterals, shape (q, 4), and nodes of the outline, shape (4 core,).
     """
     outline = _core_outline(core)
     inner = _core_points(core, CORE_DIAGONAL, CORE_SIDE) if rings else _core_points(core, 1.0, 1.0)

@@ -42,6 +42,9 @@ def free_form_solder(surface: ClosedSurface, tetrahedra: Tetrahedra, place: Plac
         tetrahedra: Tetrahedra that fill it.
         place: Map from the own frame to the assembly, where the volume is kept; points of shape (n, 3) [m].
 
+    Returns:
+        Hexahedra in the body's own frame, with wetted faces, exact volume, and ten-node tetrahedra of the same shape.
+
     Raises:
         ValueError: The free surface would have to move too far to keep the volume.
     """

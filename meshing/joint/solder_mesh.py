@@ -56,6 +56,9 @@ def mesh_joint(
         side: Underside of the package, which the head of the joint follows.
         columns: Columns of board and substrate that continue the pads.
 
+    Returns:
+        Hexahedra of solder, copper and columns by part name, with named facets and a record of the meshing.
+
     Raises:
         JointMeshError: The height of the surface differs from the gap, the package is not at its upper end, or every
             meshing attempt fails its checks; the message gives the reason of each.
@@ -75,7 +78,8 @@ def mesh_bridge(surface: ClosedSurface, sites: Sequence[PadSite], package: Packa
         side: Underside of the package.
 
     Raises:
-        JointMeshError: As in ``mesh_joint``, or the body crosses a plane of symmetry.
+        JointMeshError: The height of the surface differs from the gap, every meshing attempt fails its checks, or the
+            body crosses a plane of symmetry.
     """
     first, second = sites
     _check_distance(surface, first, second)
@@ -104,7 +108,8 @@ def mesh_coarse_joint(surface: ClosedSurface, site: PadSite, package: Package, s
         side: Underside of the package, which the head of the joint follows.
 
     Raises:
-        JointMeshError: The joint cannot be swept, a scaled Jacobian is too small, or the errors of ``mesh_joint``.
+        JointMeshError: The joint cannot be swept, a scaled Jacobian is too small, volume or shape differ too much from
+            the surface, or the height of the surface differs from the gap.
     """
     overhang = package.copper.thickness if package.copper.layout == "pads" else 0.0
     to_assembly = JointPlace.of(surface, site, side, overhang)
@@ -129,7 +134,10 @@ def mesh_coarse_or_fine(
         fine: Fine mesh of the joint.
         site: Positions and sizes of its pads.
         package: Package with copper and numerics.
-        side: Underside of the package.
+        side: Underside of the package, which the head of the joint follows.
+
+    Returns:
+        Coarse mesh, or fine mesh without columns.
     """
     try:
         return mesh_coarse_joint(surface, site, package, side)

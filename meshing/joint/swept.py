@@ -46,6 +46,9 @@ def swept_solder(surface: ClosedSurface, numerics: JointNumerics, place: Placing
         place: Map from the own frame to the assembly, where the volume is kept; points of shape (n, 3) [m].
         overhang: Height by which each end face is extruded as a part of the body [m].
 
+    Returns:
+        Hexahedra in the body's own frame, with wetted faces, exact volume, and the scale of the outlines.
+
     Raises:
         ValueError: A section is not star-shaped, or the layers are too few to keep the volume or to grow smoothly.
     """
@@ -81,6 +84,9 @@ def solder_levels(
         place: Map from the own frame to the assembly, points of shape (n, 3) [m]. The volume is kept there, because
             the gap under a curved package varies over the joint.
         overhang: Height by which each end face is extruded as a part of the body [m].
+
+    Returns:
+        Nodes level by level, shape (layers + 1, n, 3) [m], the common factor, and the exact volume [m^3].
 
     Raises:
         ValueError: A section is not star-shaped, or the layers are too few to keep the volume or to grow smoothly.

@@ -52,6 +52,9 @@ def fill_with_tetrahedra(surface: ClosedSurface, size: float, cut_into_patches: 
         size: Target edge length [m].
         cut_into_patches: Whether Gmsh cuts the surface into patches that it can parametrise, as closed shells need.
 
+    Returns:
+        Nodes, tetrahedra, and surface triangles with the labels FREE, BOARD_PAD or PACKAGE_PAD.
+
     Raises:
         FreeFormError: Gmsh cannot parametrise a patch or cannot fill the surface.
     """
@@ -72,10 +75,20 @@ def fill_with_tetrahedra(surface: ClosedSurface, size: float, cut_into_patches: 
 
 
 def fill_in_process(surface: ClosedSurface, size: float, cut_into_patches: bool) -> Tetrahedra:
-    """Run ``fill_with_tetrahedra`` in a separate process; same arguments, result and errors.
+    """Remesh a closed surface and fill it with tetrahedra, in a separate process.
 
-    The mesh then does not depend on earlier calls of Gmsh. A crash of Gmsh ends only that process and raises
-    FreeFormError, as does a mesh that takes too long.
+    The mesh then does not depend on earlier calls of Gmsh, and a crash of Gmsh ends only that process.
+
+    Args:
+        surface: Closed surface in the body's own frame, with any number of pads and shells.
+        size: Target edge length [m].
+        cut_into_patches: Whether Gmsh cuts the surface into patches that it can parametrise, as closed shells need.
+
+    Returns:
+        Nodes, tetrahedra, and surface triangles with the labels FREE, BOARD_PAD or PACKAGE_PAD.
+
+    Raises:
+        FreeFormError: Gmsh cannot parametrise a patch, cannot fill the surface, crashes, or takes too long.
     """
     with ProcessPool(1) as pool:
         try:

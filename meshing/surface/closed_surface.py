@@ -107,7 +107,11 @@ def check_surface(surface: ClosedSurface) -> None:
 def edge_numbers(edges: np.ndarray) -> np.ndarray:
     """Return an integer key for each directed edge, given by its two vertices (e, 2); edges with equal keys are equal.
 
-    The result has the shape (e,); an edge and its reverse have different keys.
+    Args:
+        edges: Numbers of the first and the second vertex, shape (e, 2).
+
+    Returns:
+        Keys, shape (e,); an edge and its reverse have different keys.
     """
     return (edges[:, 0].astype(np.int64) << 32) + edges[:, 1]
 
@@ -129,7 +133,7 @@ def volume_of(points: np.ndarray, triangles: np.ndarray) -> float:
 
 
 def pad_planes(surface: ClosedSurface) -> PadPlanes:
-    """Fit the plane of the package's pad, or pads."""
+    """Fit the plane of the package's pad, or the common plane of its pads, in the surface's own frame."""
     return PadPlanes.fit(surface.points, surface.triangles[surface.boundary == PACKAGE_PAD])
 
 
@@ -176,13 +180,13 @@ def pieces_of(surface: ClosedSurface, pad: int | None = None) -> list[np.ndarray
 
 
 def write_surface(path: Path, surface: ClosedSurface) -> None:
-    """Write the surface with its boundary labels as ``.vtu``, or without labels as ``.stl``, by the suffix."""
+    """Write a surface in metres with its boundary labels as ``.vtu``, or without labels as ``.stl``, by the suffix."""
     labels = {} if path.suffix == ".stl" else {"boundary": [surface.boundary]}
     meshio.write(path, meshio.Mesh(surface.points, [("triangle", surface.triangles)], cell_data=labels))
 
 
 def read_surface(path: Path) -> ClosedSurface:
-    """Read a surface that ``write_surface`` wrote as ``.vtu``."""
+    """Read a surface that ``write_surface`` wrote as ``.vtu``: vertices in metres, triangles, and their labels."""
     mesh = meshio.read(path)
     return ClosedSurface(mesh.points, mesh.cells[0].data.astype(np.int32), mesh.cell_data["boundary"][0])
 
@@ -210,5 +214,5 @@ def area_vectors(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def pad_area(surface: ClosedSurface, pad: int) -> float:
-    """Return the wetted area [m^2] of all pads of a side, BOARD_PAD or PACKAGE_PAD."""
+    """Return the wetted area [m^2] of all pads of one side; ``pad`` is its label, BOARD_PAD or PACKAGE_PAD."""
     return float(np.linalg.norm(area_vectors(surface.points, surface.triangles[surface.boundary == pad]), axis=1).sum())

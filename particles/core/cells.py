@@ -102,6 +102,9 @@ def cell_of(point, origin, size, shape):
 def extent(points):
     """Return the extent of points, shape (n, 3), and the number of points that are not finite.
 
+    Args:
+        points: Coordinates, shape (n, 3).
+
     Returns:
         Lowest coordinates (x, y, z), highest coordinates (x, y, z), and number of points with an infinite coordinate or
         NaN.

@@ -74,8 +74,8 @@ def raise_to(values, i, value):
     The simulator replaces ``cuda`` only in the module of ``loop_over``, so loops of other modules call this function.
 
     Args:
-        values: Device array, changed in place.
-        i: Index.
+        values: Device array of numbers, shape (n,), changed in place.
+        i: Index of the entry, a scalar.
         value: Scalar.
     """
     cuda.atomic.max(values, i, value)

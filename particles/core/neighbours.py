@@ -167,7 +167,7 @@ def tabulate_near(
         centres: Coordinates, shape (m, 3) [m], finite.
         points: Coordinates, shape (n, 3) [m], finite.
         radius: Search radius [m].
-        movers: As for ``find_near``.
+        movers: Number of moving centres and points, the first of both; pairs of two fixed ones are left out.
         rows: Table of an earlier call, shape (m, k), overwritten and returned if it has room enough.
 
     Returns:

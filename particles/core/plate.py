@@ -95,7 +95,10 @@ def placed_geometry(geometry: JointGeometry, plates: Sequence[Plate]) -> JointGe
 
     Args:
         geometry: Geometry of the joint, whose radii are kept.
-        plates: Present plates of board and package.
+        plates: Present plates of board and package, in this order.
+
+    Returns:
+        Geometry with the present gap, offset and tilt.
     """
     board, package = plates
     x, y, gap = map(float, board.local(package.origin[None])[0])

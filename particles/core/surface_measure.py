@@ -20,7 +20,14 @@ ALL_WAYS = 0.7
 
 @njit(cache=True)
 def area_vector(points, i, j, k):
-    """Return the normal (x, y, z) of the triangle of points i, j, k of (n, 3), with twice its area as length [m^2]."""
+    """Return the normal (x, y, z) of a triangle, a tuple of scalars, with twice its area as length [m^2].
+
+    Args:
+        points: Positions, shape (n, 3) [m].
+        i: Number of the first vertex, a scalar.
+        j: Number of the second vertex; seen from the tip of the normal, vertices run counter-clockwise.
+        k: Number of the third vertex.
+    """
     ux, uy, uz = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1], points[j, 2] - points[i, 2]
     vx, vy, vz = points[k, 0] - points[i, 0], points[k, 1] - points[i, 1], points[k, 2] - points[i, 2]
     return uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
@@ -129,12 +136,12 @@ def _wall_volume_and_gradient(points, ring, sixth, gradient):
 
 
 def ahead(values: NDArray[Any]) -> NDArray[Any]:
-    """Return the values at the next vertices of a closed line, shape (k, ...); five times as fast as ``np.roll``."""
+    """Return the values at the next vertices of a closed line, shape (k, ...) in and out; faster than ``np.roll``."""
     return np.concatenate((values[1:], values[:1]))
 
 
 def behind(values: NDArray[Any]) -> NDArray[Any]:
-    """Return the values at the previous vertices of a closed line, shape (k, ...)."""
+    """Return the values at the previous vertices of a closed line, in order along it, shape (k, ...) in and out."""
     return np.concatenate((values[-1:], values[:-1]))
 
 
@@ -240,7 +247,14 @@ def surface_flux(points, triangles, velocity):
 
 
 def enclosed_volume(points: Floats, triangles: Indices, rings: Sequence[Indices], plates: Sequence[Plate]) -> float:
-    """Return the volume enclosed by the surface and the walls [m^3]; arguments as for ``volume_and_gradient``."""
+    """Return the volume enclosed by the surface and the walls [m^3].
+
+    Args:
+        points: Positions, shape (n, 3) [m].
+        triangles: Outward triangles of the free surface, shape (t, 3).
+        rings: Vertices of each contact line, shape (k,) each; empty for a closed surface.
+        plates: Wall of each contact line.
+    """
     return volume_and_gradient(points, triangles, rings, plates)[0]
 
 

@@ -69,7 +69,10 @@ def surface_planes(cloud: Cloud) -> list[tuple[int, NDArray[np.int32]]]:
 
 
 def share(cloud: Cloud) -> Floats:
-    """Return the share of each particle in the computed part: 1/2 on a plane, 1/4 on both, else 1; shape (n,)."""
+    """Return the share of each particle in the computed part: 1/2 on a plane, 1/4 on both, else 1; shape (n,).
+
+    The computed part is cut off at the planes of symmetry of the cloud; without planes all shares are 1.
+    """
     result = np.ones(len(cloud.points))
     for axis in cloud.symmetry:
         result[on_plane(cloud, axis)] *= 0.5
@@ -113,6 +116,10 @@ def whole_points(cloud: Cloud, points: Floats, wall: int) -> tuple[Floats, Indic
 
 def whole_line(cloud: Cloud, count: int) -> tuple[Indices, Floats]:
     """Return the closed contact line around the whole body as images of an arc with ``count`` vertices.
+
+    Args:
+        cloud: Cloud of the computed part, with its planes of symmetry.
+        count: Number of vertices of the arc; the line is the arc itself without planes of symmetry.
 
     Returns:
         Vertex of the arc for each vertex of the line, shape (m,), the arc first, and the signs of its coordinates,

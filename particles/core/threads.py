@@ -11,7 +11,11 @@ PARTICLES_PER_THREAD = 4000
 
 @contextmanager
 def threads_for(particles: int) -> Iterator[None]:
-    """Limit the number of threads within a ``with`` block to one per ``PARTICLES_PER_THREAD`` particles."""
+    """Limit the number of threads within a ``with`` block to one per ``PARTICLES_PER_THREAD`` particles.
+
+    Args:
+        particles: Number of particles in the loops of the block; there is at least one thread.
+    """
     before = get_num_threads()
     set_num_threads(max(1, min(before, particles // PARTICLES_PER_THREAD)))
     try:

@@ -64,12 +64,16 @@ class Poiseuille(PlaneFlow):
 
 
 def channel_points(scene: Poiseuille) -> Floats:
-    """Return the initial positions of the liquid particles, shape (3, n) [m]."""
+    """Return the initial positions of the liquid particles, rows x, y, z of shape (3, n) [m].
+
+    Args:
+        scene: Width and length of the channel, and particle spacing; the lattice lies in the plane y = 0.
+    """
     return lattice(np.arange(scene.columns), np.arange(scene.numerics.particles_across), scene.spacing)
 
 
 def plate_points(scene: Poiseuille, layers: int) -> Floats:
-    """Return the positions of the wall particles of both plates, shape (3, m) [m].
+    """Return the positions of the wall particles of both plates, rows x, y, z of shape (3, m) [m].
 
     Args:
         scene: Channel.

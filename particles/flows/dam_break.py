@@ -68,7 +68,11 @@ class DamBreak(PlaneFlow):
 
 
 def column_points(scene: DamBreak) -> Floats:
-    """Return the initial positions of the particles of the column, shape (3, n) [m]."""
+    """Return the initial positions of the particles of the column, rows x, y, z of shape (3, n) [m].
+
+    Args:
+        scene: Size of the column and particle spacing; the lattice lies in the plane y = 0.
+    """
     return lattice(np.arange(scene.columns), np.arange(scene.numerics.particles_across), scene.spacing)
 
 

@@ -24,7 +24,8 @@ def impact_texts(scene: Droplet, history: Mapping[str, Floats]) -> dict[str, str
 
     Args:
         scene: Droplet.
-        history: Samples over time; the columns ``foot``, ``parts`` and ``shed`` are used.
+        history: Samples over time; ``foot`` (wetted diameter [m]), ``parts`` (number) and ``shed`` (number of
+            detachments so far) are used, each of shape (n,).
 
     Returns:
         Texts ``outcome``, ``film`` (its thickness) and, where correlations are valid, ``spread_expected``.
@@ -93,7 +94,11 @@ def outcome(history: Mapping[str, Floats]) -> str:
 
 
 def rest_metrics(scene: Droplet) -> tuple[str, ...]:
-    """Return the names of the metrics with an exact value at rest, for a free sphere or a weightless spherical cap."""
+    """Return the names of the metrics with an exact value at rest, for a free sphere or a weightless spherical cap.
+
+    They are pressure and roundness of a free drop, base and height on a wall; empty for a drop with weight, an impact,
+    or a bounded scene.
+    """
     if not scene.has_wall:
         return ("pressure_error", "roundness")
     weighs = decide_flow(scene)["droplet_gravity"]["on"]

@@ -43,6 +43,10 @@ class TaylorGreen(PlaneFlow):
 
 
 def box_points(scene: TaylorGreen) -> Floats:
-    """Return the initial positions of the particles in the box, shape (3, n) [m]."""
+    """Return the initial positions of the particles in the box, rows x, y, z of shape (3, n) [m].
+
+    Args:
+        scene: Side of the periodic box and particle spacing; the lattice lies in the plane y = 0.
+    """
     indices = np.arange(scene.numerics.particles_across)
     return lattice(indices, indices, scene.spacing)

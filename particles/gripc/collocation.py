@@ -49,11 +49,11 @@ class Operators:
 
 
 def collocate(points: Floats, plates: Sequence[Plate], spacing: float, basis: str) -> Operators:
-    """Fit the operators at the particles.
+    """Fit sparse matrices for values, derivatives and smoothing at the particles by moving least squares.
 
     Args:
         points: Particle positions, shape (n, 3) [m].
-        plates: Walls, mirrored.
+        plates: Walls, at which particles are mirrored; may be empty.
         spacing: Particle spacing [m].
         basis: "linear" or "quadratic".
 

@@ -126,9 +126,9 @@ def shape_weights(rows, points, offsets, indices, support):
     Args:
         rows: Particles, shape (m,).
         points: Positions, shape (n, 3) [m].
-        offsets: Start of each particle's neighbours, shape (n + 1,).
+        offsets: Start of each particle's neighbours in ``indices``, shape (n + 1,).
         indices: Neighbours, shape (k,).
-        support: Support radius [m].
+        support: Support radius, scalar [m].
 
     Returns:
         Weights of pairs, shape (k, 1), and of the particle itself, shape (m, 1); order of each row, 0 where M is
@@ -163,10 +163,17 @@ def shape_weights(rows, points, offsets, indices, support):
 
 @njit(cache=True)
 def linear_weights(rows, points, offsets, indices, support):
-    """Return first derivatives and the Laplacian of the linear MLS shape functions; arguments as ``shape_weights``.
+    """Return first derivatives and the Laplacian of the linear MLS shape functions at some particles.
 
     psi_J = b . p_J w_J with M b = p; derivatives of b from M b,i = p,i - M,i b and
     M b,ii = -2 M,i b,i - M,ii b (Belytschko et al. 1996). Offsets are in units of the support radius.
+
+    Args:
+        rows: Particles, shape (m,).
+        points: Positions, shape (n, 3) [m].
+        offsets: Start of each particle's neighbours in ``indices``, shape (n + 1,).
+        indices: Neighbours, shape (k,).
+        support: Support radius, scalar [m].
 
     Returns:
         Weights of pairs, shape (k, 4), and of the particle itself, shape (m, 4), in the columns d/dx, d/dy, d/dz and
@@ -309,9 +316,16 @@ def _write_targets(support, size, right):
 
 @njit(cache=True)
 def quadratic_weights(rows, points, offsets, indices, support):
-    """Return the weights of a fitted second-order Taylor expansion; arguments as ``shape_weights``.
+    """Return the weights of derivatives by a fitted second-order Taylor expansion at some particles.
 
     A row whose neighbours do not determine the quadratic terms falls back to a linear fit.
+
+    Args:
+        rows: Particles, shape (m,).
+        points: Positions, shape (n, 3) [m].
+        offsets: Start of each particle's neighbours in ``indices``, shape (n + 1,).
+        indices: Neighbours, shape (k,).
+        support: Support radius, scalar [m].
 
     Returns:
         Weights of pairs, shape (k, 4), and their negative sums at the particle, shape (m, 4), in the columns d/dx,

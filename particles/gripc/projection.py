@@ -48,9 +48,9 @@ def predict_velocity(operators: Operators, material: Material, velocity: Floats,
 
     Args:
         operators: Operators at the particles.
-        material: Density over the time step, and viscosity.
-        velocity: Unsmoothed velocity v before the step, shape (3 n,) [m/s].
-        slope: Gradient of the last pressure, shape (3 n,) [Pa/m].
+        material: Density over the time step [kg/(m^3 s)], and viscosity [Pa s].
+        velocity: Unsmoothed velocity v before the step, all x, all y, all z, shape (3 n,) [m/s].
+        slope: Gradient of the last pressure in the same order, shape (3 n,) [Pa/m].
         basis: "linear" or "quadratic".
 
     Raises:
@@ -117,11 +117,14 @@ def correct_pressure(
     """Correct the pressure in rotational incremental form: phi = p_new - p + mu div v* (eqs 21, 22 and 24).
 
     Args:
-        poisson: Poisson problem.
-        material: Density over the time step, and viscosity.
+        poisson: Poisson problem: operators, particles of the free surface, basis.
+        material: Density over the time step [kg/(m^3 s)], and viscosity [Pa s].
         divergence: Divergence of the predicted velocity, shape (n,) [1/s].
         pressure: Coefficients of the last pressure, shape (n,) [Pa].
         boundary: Pressure of the free surface, read there, shape (n,) [Pa].
+
+    Returns:
+        Coefficients of phi and pressure at the end of the step, shape (n,) each [Pa], and number of iterations.
 
     Raises:
         SolveFailed: The linear solve failed.
@@ -149,7 +152,7 @@ def smooth_velocities(last: Velocities, coefficients: Floats, smoothing: sparse.
     """Return the velocities after a step, u_new = (1 - a) (u + S (V_new - V)) + a S V_new with a = 0.5 (eq 28).
 
     Args:
-        last: Velocities before the step.
+        last: Coefficients V and unsmoothed velocities u of the particles before the step, shape (3 n,) each [m/s].
         coefficients: New coefficients V_new, shape (3 n,) [m/s].
         smoothing: Smoothing operator S, shape (3 n, 3 n).
     """

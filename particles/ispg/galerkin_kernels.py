@@ -20,10 +20,10 @@ def supports(rows, points, lists, spacing):
     """Return the squared support radius of some particles, and the number of points within it.
 
     Args:
-        rows: Particles, shape (m,).
-        points: Particles and ghosts, shape (n + g, 3) [m].
+        rows: Numbers of the particles, shape (m,).
+        points: Positions of n particles, then of g ghosts, shape (n + g, 3) [m].
         lists: Offsets (n + 1,) and indices (k,) of the neighbours, and the radius of the search, a scalar [m].
-        spacing: Particle spacing [m].
+        spacing: Particle spacing, scalar [m]; the support is two spacings, or wider to hold 16 neighbours.
 
     Returns:
         Squared radii, zero where the search found too few points, shape (m,) [m^2], and numbers of points, shape (m,).
@@ -81,7 +81,8 @@ def _square_of_the_fewest(points, i, neighbours):
 def with_rows(lists, rows, others):
     """Return neighbour lists, offsets (n + 1,) and indices (k,), with some rows replaced.
 
-    ``others`` has the offsets and indices of the new rows; particles themselves in them are left out.
+    ``lists`` are the old offsets and indices, ``rows`` (m,) the particles whose rows change, ``others`` the offsets
+    (m + 1,) and indices of their new rows. A particle itself is left out of its row.
     """
     (offsets, indices), (starts, replacements) = lists, others
     number = np.full(offsets.shape[0] - 1, -1)
@@ -166,15 +167,15 @@ def shape_rows(points, lists, squares, starts, shares):
     psi_J = w_J b . p_J with M b = (1, 0, 0, 0); psi_J,c = w_J b,c . p_J + w_J,c b . p_J with M b,c = e_c - M,c b.
 
     Args:
-        points: Particles and ghosts, shape (n + g, 3) [m].
-        lists: Offsets and indices of the neighbours.
+        points: Positions of n particles, then of g ghosts, shape (n + g, 3) [m].
+        lists: Offsets (n + 1,) and indices of the neighbours.
         squares: Squared support radii, shape (n,) [m^2].
         starts: Start of each row, shape (n + 1,).
         shares: Share with which each point counts in the density, shape (n + g,).
 
     Returns:
-        Columns, shape (k,), weights, shape (k, 4), and densities up to a constant factor, zero where M is singular,
-        shape (n,) [1/m^3].
+        Columns, shape (k,); weights psi, psi,x, psi,y, psi,z, shape (k, 4) [1, 1/m]; densities up to a constant factor,
+        zero where M is singular, shape (n,) [1/m^3].
     """
     offsets, indices = lists
     count, longest = squares.shape[0], np.diff(starts).max()
@@ -213,7 +214,7 @@ def shape_rows(points, lists, squares, starts, shares):
 def values(starts, columns, weights, field):
     """Return N f at the particles, shape (n, d), of a field f on particles and ghosts, shape (n + g, d).
 
-    The rows ``starts`` (n + 1,), ``columns`` (k,) and ``weights`` (k, 4) are those of ``shape_rows``.
+    ``starts`` (n + 1,), ``columns`` (k,), ``weights`` (k, 4) are the rows of shape functions N and their derivatives.
     """
     result = np.zeros((starts.shape[0] - 1, field.shape[1]))
     for i in range(result.shape[0]):
@@ -225,9 +226,9 @@ def values(starts, columns, weights, field):
 
 @njit(cache=True)
 def spread(starts, columns, weights, parts, source):
-    """Apply the transpose of ``values`` for a scalar that is even at the walls, ``parts`` (n,); return shape (n,).
+    """Distribute a scalar, ``parts`` (n,), to particles by shape functions, ghosts counting as their particles: (n,).
 
-    ``source`` (g,) is the particle that each ghost mirrors; rows as for ``values``.
+    ``source`` (g,) is the particle that each ghost mirrors; ``starts`` (n + 1,), ``columns`` (k,), ``weights`` (k, 4).
     """
     count = starts.shape[0] - 1
     result = np.zeros(count)
@@ -243,9 +244,9 @@ def lost_power(rows, fields, factors, walls):
     """Return the power in one velocity field of the forces that resist another one.
 
     Args:
-        rows: Starts (n + 1,), columns (k,) and weights (k, 4) of the shape functions.
-        fields: Velocity that causes the forces and velocity in which they act, with ghosts, shape (n + g, 3) [m/s].
-        factors: Coefficients of ``resistance``, shape (n, 3).
+        rows: Starts (n + 1,), columns (k,) and weights (k, 4) of the shape functions N.
+        fields: Velocity that causes the forces and velocity in which they act, both with ghosts, (n + g, 3) [m/s].
+        factors: Coefficients of v - N v [kg/s], of N v [kg/s] and of twice the strain rate [N m s], shape (n, 3).
         walls: Wall velocities at the particles, shape (n, 3) [m/s].
 
     Returns:
@@ -272,7 +273,7 @@ def lost_power(rows, fields, factors, walls):
 
 @njit(cache=True)
 def velocity_gradient(starts, columns, weights, field):
-    """Return d v_c / d x_d, shape (n, 3, 3) [1/s], of velocities (n + g, 3) [m/s]; rows as for ``values``."""
+    """Return dv_c / dx_d (n, 3, 3) [1/s] of ``field`` (n + g, 3) [m/s]; starts (n + 1), columns (k), weights (k, 4)."""
     count = starts.shape[0] - 1
     gradient = np.empty((count, 3, 3))
     for i in range(count):
@@ -301,10 +302,10 @@ def resistance(starts, columns, weights, field, factors):
     """Return the forces of smoothing, wall drag and viscosity that resist a velocity field, in one pass over the rows.
 
     Args:
-        starts: Start of each row, shape (n + 1,).
-        columns: Columns, shape (k,).
-        weights: Weights, shape (k, 4).
-        field: Velocities with ghosts, shape (n + g, 3) [m/s].
+        starts: Start of each row of the shape functions N, shape (n + 1,).
+        columns: Particles and ghosts in the rows, shape (k,).
+        weights: Shape functions and their derivatives by x, y, z, shape (k, 4) [1, 1/m].
+        field: Velocities v with ghosts, shape (n + g, 3) [m/s].
         factors: Coefficients of v - N v [kg/s], of N v [kg/s] and of twice the strain rate [N m s], shape (n, 3).
 
     Returns:
@@ -340,7 +341,7 @@ def resistance(starts, columns, weights, field, factors):
 
 @njit(cache=True)
 def divergence(starts, columns, weights, field):
-    """Return the divergence, shape (n,) [1/s], of velocities with ghosts (n + g, 3) [m/s]; rows as for ``values``."""
+    """Return the divergence (n,) [1/s] of velocities (n + g, 3) [m/s]; starts (n + 1), columns (k), weights (k, 4)."""
     count = starts.shape[0] - 1
     result = np.empty(count)
     for i in range(count):
@@ -354,7 +355,7 @@ def divergence(starts, columns, weights, field):
 
 @njit(cache=True)
 def divergence_transposed(starts, columns, weights, factor, result):
-    """Add the transpose of ``divergence`` times ``factor`` (n,) [N m] to forces ``result``, shape (n + g, 3) [N]."""
+    """Add div^T ``factor`` (n,) [N m] to ``result`` (n + g, 3) [N]; starts (n + 1), columns (k), weights (k, 4)."""
     for i in range(starts.shape[0] - 1):
         f = factor[i]
         if f != 0.0:
@@ -369,7 +370,7 @@ def divergence_transposed(starts, columns, weights, factor, result):
 def reflected(field, source, reflection):
     """Append the reflected vectors of the ghosts to a vector field, shape (n, 3) to (n + g, 3).
 
-    Ghost k mirrors the particle ``source[k]``; ``reflection[k]``, shape (3, 3), maps the vector.
+    ``source`` (g,) is the particle that each ghost mirrors; ``reflection`` (g, 3, 3) maps its vector to the ghost.
     """
     count = field.shape[0]
     result = np.empty((count + source.shape[0], 3))
@@ -387,7 +388,7 @@ def reflected(field, source, reflection):
 
 @njit(cache=True)
 def folded(forces, source, reflection):
-    """Apply the transpose of ``reflected``: add forces on ghosts to their particles, shape (n + g, 3) to (n, 3) [N]."""
+    """Add ghost forces, turned by ``reflection`` (g, 3, 3), to particles ``source`` (g,): (n + g, 3) to (n, 3) [N]."""
     count = forces.shape[0] - source.shape[0]
     result = forces[:count].copy()
     for g in range(source.shape[0]):

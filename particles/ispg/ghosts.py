@@ -90,12 +90,13 @@ def mirror_particles(
 
     Args:
         points: Particle positions, shape (n, 3) [m].
-        plates: Walls.
+        plates: Walls; an empty sequence gives no ghosts.
         reach: Distance from a plate up to which particles are mirrored [m].
         slip_lengths: Slip length of each plate [m], 0 without slip; None for free slip on all plates.
 
     Returns:
-        Positions of the ghosts, the particle that each mirrors, and the reflection of its vectors.
+        Positions of the g ghosts, shape (g, 3) [m], the particle that each mirrors, shape (g,), and the matrix that
+        maps its vectors to the ghost, shape (g, 3, 3); plate by plate, with the steps of repeated reflections.
     """
     all_points, source, nothing = points, np.arange(len(points)), np.zeros(0, np.int64)
     reflection = np.tile(np.eye(3), (len(points), 1, 1))

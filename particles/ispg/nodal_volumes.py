@@ -75,7 +75,7 @@ def _add_moments(points, triangles, result):
 
 
 def cell_share(body: Body) -> Floats:
-    """Return the share of a full cell of each particle without regard to walls: a half on the surface, shape (n,)."""
+    """Return the share of a full cell of each particle, walls ignored: 1/2 on the surface, 1 inside, shape (n,)."""
     on_surface = np.arange(len(body.points)) < body.cloud.surface_count
     return np.where(on_surface, 0.5, 1.0)
 
@@ -105,7 +105,7 @@ def nodal_volumes(body: Body, density: Floats, moments: Moments) -> Floats:
         body: Liquid body.
         density: Particle density at each particle, with walls mirrored and the free surface counted by ``cell_share``,
             shape (n,).
-        moments: Integrals of 1, x and x x over the body.
+        moments: Integrals over the body of 1 [m^3], x, shape (3,) [m^4], and x x, shape (3, 3) [m^5].
 
     Raises:
         NoNodalVolumes: No positive volumes match the volume and the centre of the body.
@@ -121,7 +121,7 @@ def fit_to_moments(body: Body, cells: Floats, moments: Moments) -> Floats:
     Args:
         body: Liquid body.
         cells: Relative cell volumes, in any unit, shape (n,).
-        moments: Integrals of 1, x and x x over the body.
+        moments: Integrals over the body of 1 [m^3], x, shape (3,) [m^4], and x x, shape (3, 3) [m^5].
 
     Raises:
         NoNodalVolumes: No positive volumes match the volume and the centre of the body.

@@ -51,7 +51,7 @@ def normal_surface_force(body: Body, physics: Physics, masses: Floats, share: fl
         body: Liquid body.
         physics: Effects that act on the body.
         masses: Particle masses, shape (n,) [kg].
-        share: Share of the tangential part that acts.
+        share: Share of the tangential part that acts, 0 to 1.
     """
     force = physics.force(body)
     slope = physics.admit(body, body.volume()[1])

@@ -136,9 +136,10 @@ def with_momenta(motions: Floats, masses: Floats, basis: Floats, velocity: Float
     Args:
         motions: Rigid-body motions along which the momenta are prescribed, shape (k, n, 3).
         masses: Particle masses, shape (n,) [kg].
-        basis: Rigid-body motions that are added, as many, shape (k, n, 3).
+        basis: Rigid-body motions whose combination is added, shape (k, n, 3).
         velocity: Velocity before the correction, shape (n, 3) [m/s].
-        momenta: Required momenta, as ``rigid_momenta`` defines them, shape (k,).
+        momenta: Required sums over the particles of mass times motion times velocity, shape (k,): [kg m/s] for
+            translations, [kg m^2/s] for rotations.
     """
     moved = np.array([rigid_momenta(motions, masses, motion) for motion in basis]).T  # by columns
     missing = momenta - rigid_momenta(motions, masses, velocity)

@@ -35,8 +35,8 @@ def factor_spd(matrix, size):
     """Factor a symmetric positive definite matrix in place by Cholesky's method.
 
     Args:
-        matrix: Square array of at least ``size`` rows; its leading lower triangle is replaced by the factor.
-        size: Number of rows and columns in use.
+        matrix: Matrix, shape (>= size, >= size); the lower triangle of its leading block is replaced by the factor L.
+        size: Number of rows and columns in use, integer.
 
     Returns:
         True, or False if a pivot vanishes; the contents are then undefined.
@@ -61,9 +61,10 @@ def substitute(factor, right, size):
     """Solve in place for all columns of the right-hand side with a Cholesky factor.
 
     Args:
-        factor: Lower triangle of the factor, as ``factor_spd`` leaves it.
-        right: Right-hand sides, shape (size or more, columns), replaced by the solutions.
-        size: Number of equations.
+        factor: Array with the factor L of A = L L^T in the lower triangle of its leading block, shape (>= size, >=
+            size).
+        right: Right-hand sides, shape (>= size, columns), replaced by the solutions.
+        size: Number of equations, integer.
     """
     for col in range(right.shape[1]):
         for a in range(size):

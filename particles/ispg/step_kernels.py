@@ -43,9 +43,9 @@ def projected_blocks(starts, columns, blocks, frames):
 
     Args:
         starts: Start of each block row, shape (n + 1,).
-        columns: Column of each block, shape (k,).
-        blocks: Blocks, shape (k, 3, 3); not changed.
-        frames: Matrix of each particle, shape (n, 3, 3).
+        columns: Block column of each block, shape (k,).
+        blocks: Blocks A_ij, shape (k, 3, 3); not changed.
+        frames: Symmetric matrix F_i of each particle, shape (n, 3, 3).
 
     Returns:
         Blocks in the same order, shape (k, 3, 3).
@@ -66,12 +66,13 @@ def projected_blocks(starts, columns, blocks, frames):
 
 @njit(cache=True)
 def rates_of_volume(rows, images, parts, field):
-    """Return B v, the rates of the nodal volumes, shape (n,) [m^3/s].
+    """Return B v, the rates at which a velocity field v changes the nodal volumes, shape (n,) [m^3/s].
 
     Args:
-        rows: Shape functions: starts (n + 1,), columns (k,) and weights (k, 4).
+        rows: Shape functions: starts (n + 1,), columns (k,) and weights (k, 4), the values and derivatives by x, y, z.
         images: Ghosts: particle that each mirrors (g,) and reflection of its vectors (g, 3, 3).
-        parts: Nodal volumes, shape (n,) [m^3], and the gradient they miss, shape (n, 3) [m^2].
+        parts: Nodal volumes, shape (n,) [m^3]; gradient of the enclosed volume minus the gradient of the sum of nodal
+            volumes, shape (n, 3) [m^2].
         field: Velocity, shape (n, 3) [m/s].
     """
     volumes, unbalanced = parts
@@ -88,9 +89,10 @@ def pressure_forces(rows, images, parts, pressure):
     """Return B^T p, the transpose of ``rates_of_volume`` applied to pressures, shape (n, 3) [N].
 
     Args:
-        rows: Shape functions: starts (n + 1,), columns (k,) and weights (k, 4).
+        rows: Shape functions: starts (n + 1,), columns (k,) and weights (k, 4), the values and derivatives by x, y, z.
         images: Ghosts: particle that each mirrors (g,) and reflection of its vectors (g, 3, 3).
-        parts: Nodal volumes, shape (n,) [m^3], and the gradient they miss, shape (n, 3) [m^2].
+        parts: Nodal volumes, shape (n,) [m^3]; gradient of the enclosed volume minus the gradient of the sum of nodal
+            volumes, shape (n, 3) [m^2].
         pressure: Pressures at the particles, shape (n,) [Pa].
     """
     volumes, unbalanced = parts
@@ -103,11 +105,14 @@ def pressure_forces(rows, images, parts, pressure):
 def friction_operator(rows, images, resisted, field):
     """Apply m/dt + V + S to a velocity field and project the force onto admissible directions, shape (n, 3) [N].
 
+    V are the viscous and wall forces, S the smoothing of the velocity.
+
     Args:
-        rows: Shape functions: starts (n + 1,), columns (k,) and weights (k, 4).
+        rows: Shape functions: starts (n + 1,), columns (k,) and weights (k, 4), the values and derivatives by x, y, z.
         images: Ghosts: particle that each mirrors (g,) and reflection of its vectors (g, 3, 3).
-        resisted: Masses over the time step, shape (n,) [kg/s]; coefficients of ``resistance``, shape (n, 3);
-            projections of the particles, shape (n, 3, 3).
+        resisted: Masses over the time step, shape (n,) [kg/s]; coefficients of v - N v [kg/s] (smoothing), of N v
+            [kg/s] (wall drag) and of twice the strain rate [N m s], shape (n, 3); projections of the particles onto the
+            velocities that walls admit, shape (n, 3, 3).
         field: Velocity, shape (n, 3) [m/s].
     """
     inertia, factors, admitted = resisted
@@ -125,7 +130,7 @@ def admitted_rates(rows, images, volumes, admitted):
     The correction of nodal integration is left out. A particle and its ghosts make one entry.
 
     Args:
-        rows: Shape functions: starts (n + 1,), columns (k,) and weights (k, 4).
+        rows: Shape functions: starts (n + 1,), columns (k,) and weights (k, 4), the values and derivatives by x, y, z.
         images: Ghosts: particle that each mirrors (g,) and reflection of its vectors (g, 3, 3).
         volumes: Nodal volumes, shape (n,) [m^3].
         admitted: Projections onto the velocities that walls admit, shape (n, 3, 3).

@@ -27,6 +27,10 @@ def problems(solder: Solder, geometries: Mapping[str, JointGeometry], pitch: flo
         solder: Solder of each joint.
         geometries: Joint name -> geometry.
         pitch: Distance between neighbouring joints [m].
+
+    Returns:
+        One ``Problem`` (key in the case file, message, value, allowed values) for each contradiction; empty for a valid
+        case.
     """
     effects = decide_effects(next(iter(geometries.values())), solder)
     solder_problems = scheme_problems(solder) + effect_problems(solder, effects) + _angle_problems(solder)

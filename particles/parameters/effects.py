@@ -43,13 +43,16 @@ def decide(numbers: Numbers, solder: Solder) -> dict[str, Decision]:
         solder: Fluid, process and the switches of the effects.
 
     Returns:
-        Effect name -> state ``on``, reason ``why`` and, if predicted, ``influence``.
+        Name of an effect, such as ``inertia`` -> state ``on``, reason ``why`` and, if predicted, ``influence``.
     """
     return decide_all(LIQUID_EFFECTS, LiquidScene(numbers, solder))
 
 
 def decide_effects(geometry: JointGeometry, solder: Solder) -> dict[str, Decision]:
-    """Decide on each effect of the reflow of a joint: name -> decision."""
+    """Decide on each effect of the reflow of a joint: name -> decision.
+
+    A decision has the state ``on``, the reason ``why`` and, if predicted, the relative ``influence`` on the result.
+    """
     return decide(dimensionless_numbers(geometry, solder), solder)
 
 
@@ -67,7 +70,10 @@ def decide_drop(solder: Solder, is_free: bool) -> dict[str, Decision]:
 
 
 def decide_oscillation(solder: Solder) -> dict[str, Decision]:
-    """Decide on each effect of a free oscillating drop: name -> decision."""
+    """Decide on each effect of a free oscillating drop: name -> decision.
+
+    A decision has the state ``on``, the reason ``why`` and, if predicted, the relative ``influence`` on the result.
+    """
     return decide_all(LIQUID_EFFECTS, LiquidScene(drop_numbers(solder), solder, has_wall=False, swings=True))
 
 
@@ -91,12 +97,21 @@ def acting(effects: Mapping[str, bool]) -> Iterator[LiquidEffect]:
 
 
 def acting_weight(solder: Solder, effects: Mapping[str, Decision]) -> float:
-    """Return the acting specific weight [N/m^3], the sum over the effects that are on; rho g with gravity alone."""
+    """Return the acting specific weight [N/m^3], the sum over the effects that are on; rho g with gravity alone.
+
+    Args:
+        solder: Density, and values that other effects with a weight need.
+        effects: Name -> decision, of which ``on`` is read.
+    """
     return sum((effect.weight(solder) for effect in acting(switched(effects))), 0.0)
 
 
 def asymmetric_effect(effects: Mapping[str, Decision]) -> LiquidEffect | None:
-    """Return the first effect that is on and breaks the axis and the planes of symmetry of a drop; None without one."""
+    """Return the first effect that is on and breaks the axis and the planes of symmetry of a drop; None without one.
+
+    Args:
+        effects: Name -> decision, of which ``on`` is read.
+    """
     return next((effect for effect in acting(switched(effects)) if not effect.is_axisymmetric), None)
 
 

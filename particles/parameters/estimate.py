@@ -24,7 +24,12 @@ SECONDS_PER_SECTION_STEP_AND_PAIR = 2.3e-8
 
 
 def particle_count(solder: Solder, geometry: JointGeometry) -> int:
-    """Return the number of particles of a joint: layers of concentric rings of 6 j particles."""
+    """Return the number of particles of a joint: layers of concentric rings of 6 j particles.
+
+    Args:
+        solder: Volume, and spacing of the particles.
+        geometry: Gap and radii of the joint.
+    """
     rings, layers = joint_counts(geometry, solder.volume, solder.numerics.spacing)
     return layers * (1 + 3 * rings * (rings + 1))
 

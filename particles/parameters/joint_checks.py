@@ -24,7 +24,16 @@ KEYS = {
 
 
 def joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
-    """Find problems of a joint before it runs: the checks of an array without neighbours, under the keys of a joint."""
+    """Find problems of a joint before it runs: the checks of an array without neighbours, under the keys of a joint.
+
+    Args:
+        joint: Volume, pads, package and resolution.
+        solder: Fluid, process and numerics.
+
+    Returns:
+        One ``Problem`` (key in the case file, message, value, allowed values) for each contradiction; empty for a valid
+        case.
+    """
     if joint.offset >= joint.pad_bottom + joint.pad_top:
         allowed = f"< {mm(joint.pad_bottom + joint.pad_top)}"
         return [Problem("joint.offset", "the pads do not overlap", mm(joint.offset), allowed)]
@@ -39,7 +48,15 @@ def joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
 
 
 def unverified_joint(joint: Joint, solder: Solder) -> str | None:
-    """Return the feature of a joint for which the scheme ispg is not verified, in words; None if it is verified."""
+    """Return the feature of a joint for which the scheme ispg is not verified, in words.
+
+    Args:
+        joint: Pads and package; a package that floats on walls with friction is not verified.
+        solder: Fluid, effects and walls; a joint without inertia is examined by its geometry.
+
+    Returns:
+        Text for a message; None if the scheme is verified.
+    """
     if joint.package is not None and solder.wall != "free-slip":
         return "packages that float, on walls with friction"
     return _without_inertia(joint.geometry, solder)

@@ -32,13 +32,21 @@ class Numbers:
 
 
 def dimensionless_numbers(geometry: JointGeometry, solder: Solder) -> Numbers:
-    """Compute the numbers of a joint; H is the gap and L the radius of a cylinder of equal volume and height H."""
+    """Compute the numbers of a joint; H is the gap and L the radius of a cylinder of equal volume and height H.
+
+    Returns:
+        Bond and Ohnesorge number, capillary and viscous time [s].
+    """
     length = sqrt(solder.volume / (pi * geometry.gap))
     return _numbers(solder, length, length * geometry.gap)
 
 
 def drop_numbers(solder: Solder) -> Numbers:
-    """Compute the numbers of a drop: Bond number from V^(1/3), others from the radius of a sphere of equal volume."""
+    """Compute the numbers of a drop: Bond number from V^(1/3), others from the radius of a sphere of equal volume.
+
+    Returns:
+        Bond and Ohnesorge number, capillary and viscous time [s].
+    """
     return _numbers(solder, (0.75 * solder.volume / pi) ** (1.0 / 3.0), solder.volume ** (2.0 / 3.0))
 
 

@@ -47,7 +47,7 @@ def with_scheme(scene: Drop | Joint | Drops, solder: Solder, asked: str) -> tupl
     Args:
         scene: Drop, joint or pair of drops.
         solder: Solder of the scene.
-        asked: Scheme of the case file, or "auto".
+        asked: Scheme of the case file, with which the solder is returned unchanged, or "auto".
     """
     if asked != "auto":
         return solder, ""
@@ -59,7 +59,16 @@ def with_scheme(scene: Drop | Joint | Drops, solder: Solder, asked: str) -> tupl
 
 
 def drop_problems(drop: Drop, solder: Solder) -> list[Problem]:
-    """Find problems of a drop before it runs."""
+    """Find problems of a drop before it runs; the first kind of check that fails ends the search.
+
+    Args:
+        drop: Volume, pad or wall, section, symmetry and resolution.
+        solder: Fluid, effects and numerics.
+
+    Returns:
+        One ``Problem`` (key in the case file, message, value, allowed values) for each contradiction; empty for a valid
+        case.
+    """
     problems = _flow_problems(drop, solder) or _pad_problems(drop) or _section_problems(drop, solder)
     problems = problems or checks.ispg_problems(solder, _unverified_drop(drop, solder))
     problems = problems or _impact_problems(drop, solder)
@@ -69,7 +78,16 @@ def drop_problems(drop: Drop, solder: Solder) -> list[Problem]:
 
 
 def pair_problems(pair: Drops, solder: Solder) -> list[Problem]:
-    """Find problems of two drops before they run: too coarse, overlapping, or at an unsuitable distance."""
+    """Find problems of two drops before they run: too coarse, overlapping, or at an unsuitable distance.
+
+    Args:
+        pair: Volumes, distance, wall and resolution.
+        solder: Fluid, effects and numerics.
+
+    Returns:
+        One ``Problem`` (key in the case file, message, value, allowed values) for each contradiction; empty for a valid
+        case.
+    """
     problems = _flow_problems(pair, solder) or checks.ispg_problems(solder, _unverified_pair(pair, solder))
     problems = problems or free_problems(pair, solder) or _pair_resolution(pair)
     return problems or _distance_problems(pair, solder)
@@ -234,7 +252,16 @@ UNVERIFIED_FEATURES: dict[type, Callable[[Any, Solder], str | None]] = {
 
 
 def oscillation_problems(scene: Oscillation, solder: Solder) -> list[Problem]:
-    """Find a liquid so viscous that a drop of it returns to the sphere without oscillation."""
+    """Find a liquid so viscous that a drop of it returns to the sphere without oscillation.
+
+    Args:
+        scene: Free drop, of which the radius is used.
+        solder: Density, viscosity and surface tension.
+
+    Returns:
+        One ``Problem`` (key, message, value, allowed values) if Lamb's decay rate of the second mode reaches Rayleigh's
+        frequency; else empty.
+    """
     decay = lamb_decay_rate(2, scene.radius, solder.density, solder.viscosity)
     frequency = rayleigh_frequency(2, scene.radius, solder.density, solder.surface_tension)
     if decay < frequency:

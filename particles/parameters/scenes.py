@@ -365,5 +365,10 @@ class Oscillation(Parameters):
 
 
 def rayleigh_period(scene: Oscillation, solder: Solder) -> float:
-    """Return the period of the second mode at small amplitude and viscosity [s]."""
+    """Return the period of the second mode at small amplitude and viscosity [s].
+
+    Args:
+        scene: Free drop, of which the radius is used.
+        solder: Density and surface tension.
+    """
     return 2.0 * pi / rayleigh_frequency(2, scene.radius, solder.density, solder.surface_tension)

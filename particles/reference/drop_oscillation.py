@@ -5,7 +5,14 @@ from math import cos, pi, sqrt
 
 
 def rayleigh_frequency(mode: int, radius: float, density: float, surface_tension: float) -> float:
-    """Return the inviscid angular frequency, omega^2 = n (n - 1)(n + 2) gamma / (rho R^3) [rad/s] (Rayleigh)."""
+    """Return the inviscid angular frequency, omega^2 = n (n - 1)(n + 2) gamma / (rho R^3) [rad/s] (Rayleigh).
+
+    Args:
+        mode: Mode number n of the free drop, at least 2.
+        radius: Radius R at rest [m].
+        density: Density rho [kg/m^3].
+        surface_tension: Surface tension gamma [N/m].
+    """
     return sqrt(mode * (mode - 1) * (mode + 2) * surface_tension / (density * radius**3))
 
 
@@ -36,7 +43,14 @@ def cap_frequency(angle: float, volume: float, density: float, surface_tension: 
 
 
 def lamb_decay_rate(mode: int, radius: float, density: float, viscosity: float) -> float:
-    """Return the decay rate of the amplitude at small viscosity, (n - 1)(2 n + 1) mu / (rho R^2) [1/s] (Lamb)."""
+    """Return the decay rate of the amplitude at small viscosity, (n - 1)(2 n + 1) mu / (rho R^2) [1/s] (Lamb).
+
+    Args:
+        mode: Mode number n of the free drop, at least 2.
+        radius: Radius R at rest [m].
+        density: Density rho [kg/m^3].
+        viscosity: Dynamic viscosity mu [Pa s].
+    """
     return (mode - 1) * (2 * mode + 1) * viscosity / (density * radius**2)
 
 

@@ -34,7 +34,9 @@ def pasandideh_fard(weber: float, reynolds: float, angle: float) -> float:
 def roisman(weber: float, reynolds: float) -> float:
     """Return the maximum spread over the diameter: viscous film minus a correction for the rim (Roisman 2009).
 
-    Args: as ``pasandideh_fard``.
+    Args:
+        weber: Weber number rho U^2 D / gamma.
+        reynolds: Reynolds number rho U D / mu.
     """
     return 0.87 * reynolds**0.2 - 0.40 * reynolds**0.4 / sqrt(weber)
 
@@ -42,7 +44,9 @@ def roisman(weber: float, reynolds: float) -> float:
 def laan(weber: float, reynolds: float) -> float:
     """Return the maximum spread over the diameter, interpolated between capillary and viscous limit (Laan et al. 2014).
 
-    Args: as ``pasandideh_fard``.
+    Args:
+        weber: Weber number rho U^2 D / gamma.
+        reynolds: Reynolds number rho U D / mu.
     """
     impact = sqrt(weber * reynolds**-0.4)
     return reynolds**0.2 * impact / (1.24 + impact)
@@ -54,7 +58,10 @@ def wildeman(weber: float, reynolds: float, angle: float) -> float:
     Energy balance with dissipation in the boundary layer and loss of half of the kinetic energy:
     3 (1 - cos(theta)) / We b^2 + 0.7 / sqrt(Re) b^2 sqrt(b - 1) = 12 / We + 1/2.
 
-    Args: as ``pasandideh_fard``, with the constant contact angle of the computation [rad].
+    Args:
+        weber: Weber number rho U^2 D / gamma.
+        reynolds: Reynolds number rho U D / mu.
+        angle: Constant contact angle theta of the computation [rad].
     """
 
     def excess(width: float) -> float:
@@ -68,7 +75,10 @@ def wildeman(weber: float, reynolds: float, angle: float) -> float:
 def of_measured(weber: float, reynolds: float, angle: float) -> tuple[float, float] | None:
     """Return the smallest and the largest spread over the diameter by the correlations of measured drops.
 
-    Args: as ``pasandideh_fard``.
+    Args:
+        weber: Weber number rho U^2 D / gamma.
+        reynolds: Reynolds number rho U D / mu.
+        angle: Measured advancing contact angle [rad].
 
     Returns:
         Smallest and largest spread; None where the correlations are not valid.

@@ -199,7 +199,11 @@ def sessile_section(area: float, contact_angle: float, surface_tension: float, w
 
     Without weight it is a segment of a circle.
 
-    Args: as ``sessile_meridian``, with the area of the section [m^2].
+    Args:
+        area: Area of the whole section [m^2].
+        contact_angle: Contact angle [rad], in (0, pi).
+        surface_tension: Surface tension gamma [N/m].
+        weight: Specific weight rho g [N/m^3].
     """
     segment = np.sqrt(contact_angle - np.sin(contact_angle) * np.cos(contact_angle))
     return _sessile(np.sqrt(area), segment, contact_angle, _Fluid(surface_tension, weight), is_plane=True)

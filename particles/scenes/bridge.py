@@ -70,7 +70,16 @@ def placed_joints(
 ) -> list[Body]:
     """Return two joints at rest as bodies between two plates with the pads of both.
 
-    The bodies lie half the distance on either side of x = 0 and are not merged; arguments as for ``solve_bridge``.
+    The bodies lie half the distance on either side of x = 0 and are not merged.
+
+    Args:
+        geometries: Geometries of both joints, coaxial; the plates have the mean of their gaps.
+        shapes: Shapes of both joints at rest alone.
+        distance: Distance of their axes along x [m].
+        solder: Solder of one joint; its particle spacing is raised to a quarter of the gap.
+
+    Returns:
+        Two bodies (particles, free surface and plates), in the order of the joints.
     """
     gap = float(np.mean([geometry.gap for geometry in geometries]))
     spacing = max(solder.numerics.spacing, gap / SPACINGS_IN_GAP)
@@ -145,7 +154,11 @@ def contacts(places: Mapping[str, tuple[float, float]], widths: Mapping[str, flo
 
 
 def neighbours(pairs: Sequence[Contact]) -> dict[str, list[str]]:
-    """Return the name of each joint that touches another -> sorted names of the joints that it touches."""
+    """Return the name of each joint that touches another -> sorted names of the joints that it touches.
+
+    Args:
+        pairs: Touching pairs of ``contacts``; a joint that touches its own mirror image is its own neighbour.
+    """
     result: dict[str, set[str]] = {}
     for contact in pairs:
         result.setdefault(contact.first, set()).add(contact.second)

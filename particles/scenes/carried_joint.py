@@ -66,7 +66,8 @@ def carry_joint(
         progress: Function called with the fraction done, 0 to 1.
 
     Returns:
-        Wrenches on the pads; zero for an open joint, including one with too little solder.
+        Wrenches on the pads of board and package, shape (2, 6) [N, N m], and the number of steps; zero for an open
+        joint, including one with too little solder.
 
     Raises:
         NotAtRest: The joint is not at rest after ``solder.numerics.max_steps``, or at the end of the process.
@@ -165,8 +166,13 @@ def stiffness_estimate(geometry: JointGeometry, solder: Solder) -> NDArray[np.fl
     with the radius a of the pad and the height h of the gap, whose sections remain discs. The tilt stiffness follows
     from the axial stiffness distributed over the pad.
 
+    Args:
+        geometry: Gap and radii of the joint.
+        solder: Volume, surface tension and contact angles.
+
     Returns:
-        Stiffness, shape (6, 6), for translations [m] and rotations [rad]; negative for restoring forces.
+        Diagonal matrix, shape (6, 6), force [N] and moment [N m] by translations [m] and rotations [rad] along and
+        about x, y, z; negative for restoring forces, 0 for rotation about z.
     """
     radius, gap = min(geometry.radius_board, geometry.radius_package), geometry.gap
     lateral = pi * radius * solder.surface_tension / gap

@@ -90,7 +90,18 @@ def flow_to_rest(
 ) -> tuple[LiquidFlow, Run]:
     """Return the flow of a drop at rest and the records of its steps.
 
-    Arguments and errors as for ``drop_to_rest``; the drop may be a section, or a part cut by planes of symmetry.
+    Args:
+        drop: Volume, wall, resolution and initial motion; it may be a section, or a part cut by planes of symmetry.
+        solder: Fluid and process, with the volume of the drop.
+        progress: Function called with the fraction done, 0 to 1.
+        checkpoint: File from which the run continues, to the last bit, and to which it saves its state.
+
+    Returns:
+        Final flow (body, physics, time), and its run with a record and a profile for each step.
+
+    Raises:
+        NotAtRest: The drop is not at rest after ``solder.numerics.max_steps``.
+        SolveFailed: A linear solve failed.
     """
     acting = switched(decide_drop(solder, drop.is_free))
     if drop.section != "none":

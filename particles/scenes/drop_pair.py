@@ -54,6 +54,10 @@ def pair_to_rest(
         progress: Function called with the fraction done, 0 to 1.
         checkpoint: File from which the run continues, to the last bit, and to which it saves its state.
 
+    Returns:
+        Both drops, or the merged drop, as one shape, decisions on the effects, and the exact meridian of the merged
+        drop (None if they stay apart).
+
     Raises:
         NotAtRest: A drop is not at rest after ``solder.numerics.max_steps``.
         SolveFailed: A linear solve failed.
@@ -73,7 +77,14 @@ def pair_to_rest(
 
 
 def start_clouds(scene: Drops) -> list[Cloud]:
-    """Return the clouds of both drops, side by side along x with their common centre of volume at x = 0."""
+    """Return the clouds of both drops, side by side along x with their common centre of volume at x = 0.
+
+    Args:
+        scene: Volumes of both drops, distance of their centres [m], wall and resolution.
+
+    Returns:
+        Particles with free surface and contact line of the left drop and of the right one; both stand on the same wall.
+    """
     share = scene.volume_left / scene.volume
     centres = (-(1.0 - share) * scene.distance, share * scene.distance)
     return [_moved(_cloud(scene, volume), x) for volume, x in zip(scene.volumes, centres, strict=True)]

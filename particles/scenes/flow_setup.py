@@ -79,7 +79,15 @@ def contact_line(cloud: Cloud, wall: int, radius: float, solder: Solder) -> Cont
 
 
 def pad_lines(cloud: Cloud, solder: Solder) -> tuple[ContactLine, ...]:
-    """Set up the contact lines of a remeshed body, one per plate, from the pads of the plates."""
+    """Set up the contact lines of a remeshed body, one per plate, from the pads of the plates.
+
+    Args:
+        cloud: Particles with one ring (contact line) per plate.
+        solder: Contact angle of the mask; those of the pads are stored in the plates.
+
+    Returns:
+        Contact lines in the order of the plates; empty for a free drop.
+    """
     lines = []
     for wall, (ring, plate) in enumerate(zip(cloud.rings, cloud.plates, strict=True)):
         corners = np.array([pad.corners(cloud.spacing) for pad in plate.pads])

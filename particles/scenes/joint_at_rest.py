@@ -95,7 +95,12 @@ def joint_to_rest(
 
 
 def floating(package: FloatingPackage) -> Floating:
-    """Return the motion of a floating package: the plate 1 under its load [N], free in the directions of the case."""
+    """Return the motion of a floating package: the plate 1 under its load [N], free in the directions of the case.
+
+    Args:
+        package: Package with the force that presses it down [N] and the names of its free directions (lift, shift,
+            turn).
+    """
     free = np.vstack([DIRECTIONS[name] for name in package.free])
     return Floating(1, free, np.array([0.0, 0.0, -package.load]))
 

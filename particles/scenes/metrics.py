@@ -42,7 +42,9 @@ JOINT_NAMES = {
 def joint_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
     """Return the metrics of a joint at the end of its run: name -> (SI value, unit; angles in deg).
 
-    Errors refer to the Young-Laplace joint of the given final geometry; they are nan if it does not exist.
+    They are sizes of the shape at the end of ``flow``, contact angles, pressure, axial force, time to rest from the
+    steps of ``run``, cost and energy budget. Errors refer to the Young-Laplace joint of the final ``geometry``; they
+    are nan if it does not exist.
     """
     reference = reference_meridian(geometry, solder, _reference_weight(flow))
     errors = _joint_errors(solder, flow, run, reference) | _width_error(geometry, solder, flow, run)
@@ -58,7 +60,10 @@ def drop_metrics(solder: Solder, pad_radius: float, flow: LiquidFlow, run: Run) 
         solder: Volume, contact angles and fluid.
         pad_radius: Radius of the pad [m], infinite for a uniform wall.
         flow: Flow at the end of the run.
-        run: Records of the run.
+        run: Records of the steps.
+
+    Returns:
+        Metrics of ``body_metrics``: name -> (SI value, unit; angles in deg).
     """
     return body_metrics(solder, reference_drop(solder, pad_radius, _reference_weight(flow)), flow, run)
 
@@ -66,7 +71,8 @@ def drop_metrics(solder: Solder, pad_radius: float, flow: LiquidFlow, run: Run) 
 def body_metrics(solder: Solder, reference: Meridian | None, flow: LiquidFlow, run: Run) -> Metrics:
     """Return the metrics of a drop: name -> (SI value, unit; angles in deg).
 
-    Errors are omitted if ``reference`` is None, contact radius and angles without contact lines.
+    They are sizes, contact, pressure, time to rest, cost and energy budget. Errors against the exact meridian are
+    omitted if ``reference`` is None, contact radius and angles without contact lines.
     """
     profile = run.profiles[-1]
     height, width = profile.drop_height(len(flow.body.cloud.rings)), profile.max_width
@@ -133,7 +139,10 @@ def drop_errors(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
 
 
 def open_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
-    """Return the metrics of an open joint with a drop on the board, under the names of a joint; axial force 0."""
+    """Return the metrics of an open joint with a drop on the board, under the names of a joint; axial force 0.
+
+    The gap of ``geometry`` is the standoff; values are (SI value, unit; angles in deg).
+    """
     drop = drop_metrics(solder, geometry.radius_board, flow, run)
     renamed = {JOINT_NAMES.get(name, name): number for name, number in drop.items()}
     return renamed | {"standoff": (geometry.gap, "m"), "axial_force": (0.0, "N")}
@@ -142,6 +151,7 @@ def open_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run:
 def bridge_metrics(gap: float, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
     """Return the metrics of joints that merged into one body between plates at a distance ``gap`` [m], without errors.
 
+    Name -> (SI value, unit) of volume, ``standoff``, ``length`` along x, axial force, pressure, rest and cost;
     ``solder`` has the total volume of the joints.
     """
     length = float(np.ptp(flow.body.points[:, 0]))
@@ -179,7 +189,7 @@ def contact_radius(body: Body, wall: int) -> float:
 
 
 def mean_angle(cosines: Floats) -> float:
-    """Return the contact angle of the mean of cosines, shape (k,), one for each vertex of a contact line [deg]."""
+    """Return the contact angle [deg] of the mean of cosines, shape (k,): one for each vertex of a contact line."""
     return float(np.degrees(np.arccos(np.clip(cosines.mean(), -1.0, 1.0))))
 
 
@@ -315,7 +325,7 @@ def energy_metrics(flows: Sequence[LiquidFlow]) -> Metrics:
     """Return the metrics of the energy budget: losses by cause over the initial energy, and the imbalance.
 
     Losses of all bodies are added. The result is empty for schemes without a budget, that is all but ispg. It includes
-    the sliding speed, since a body may slide on smooth walls for ever.
+    the sliding speed [m/s], since a body may slide on smooth walls for ever.
     """
     moved = [(flow, flow.solver.state, flow.solver.first_energy) for flow in flows if isinstance(flow.solver, IspgStep)]
     started = [(flow, state, first) for flow, state, first in moved if state is not None]

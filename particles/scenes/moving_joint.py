@@ -79,7 +79,10 @@ def follow_path(
         solder: Volume, fluid and numerics; ``max_steps`` applies to each part of the path.
         path: Geometries of the joint at the targets, in order.
         checkpoints: Function of the number of a target (0 for the start) that returns its checkpoint.
-        speed: Speed of the package with inertia [m/s].
+        speed: Speed of the package with inertia [m/s]; None without inertia, for the speed above.
+
+    Yields:
+        Shape at rest at the start, then at each target; the last one has the verdict "open" if the neck ruptured.
 
     Raises:
         TooLittleSolder: No cone of the volume spans the initial gap.

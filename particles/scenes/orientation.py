@@ -54,6 +54,9 @@ def canonical(geometry: JointGeometry) -> tuple[JointGeometry, Orientation]:
 
     The package is then tilted about the y axis only, or offset along +x without tilt; rotated and mirrored joints share
     one canonical joint, so that it is computed once.
+
+    Returns:
+        Canonical geometry, and the reflection (y to -y) and rotation about z that lead from it to the joint.
     """
     x, y = _without_rounding(geometry.offset, 1.0)
     turn_x, turn_y = _without_rounding(geometry.tilt, geometry.radius_package)

@@ -43,7 +43,10 @@ FlowAndRun = tuple[LiquidFlow, Run]
 
 
 def touch(first: Body, second: Body) -> bool:
-    """Return whether the free surfaces of two bodies touch: vertices are within about a spacing of each other."""
+    """Return whether the free surfaces of two bodies (particles with a triangulated surface) touch.
+
+    They do if two of their vertices are within about the smaller particle spacing of each other.
+    """
     reach = CONTACT_SPACINGS * min(first.cloud.spacing, second.cloud.spacing)
     surfaces = [body.points[: body.cloud.surface_count] for body in (first, second)]
     distance, _ = cKDTree(surfaces[0]).query(surfaces[1], distance_upper_bound=reach)
@@ -56,7 +59,10 @@ def overlap(first: Body, second: Body) -> float:
 
 
 def collapsing(body: Body) -> bool:
-    """Return whether triangles of a body have collapsed to slivers, or its contact lines meet."""
+    """Return whether triangles of a body have collapsed to slivers, or its contact lines meet.
+
+    Slivers have an edge that is short in relation to the particle spacing, or a poor ratio of area to edges.
+    """
     corner = body.points[body.triangles]
     square = ((corner - np.roll(corner, 1, axis=1)) ** 2).sum(axis=2)
     twice_area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
@@ -80,6 +86,9 @@ def rebuild(*bodies: Body) -> Body:
 
     Args:
         bodies: One body, or bodies that touch: all free, on the same wall, or between the same two walls.
+
+    Returns:
+        Body with new particles at the smallest of the spacings, on the walls of the given bodies.
 
     Raises:
         CannotRebuild: A wall is not horizontal, or the bodies are not on the same walls.
@@ -249,7 +258,7 @@ def split_shape(joint: JointShape, solder: Solder, drops: Sequence[FlowAndRun]) 
     """Return the shape of an open joint: both drops at rest, with the history until the neck collapsed.
 
     Args:
-        joint: Shape of the joint when its neck collapsed.
+        joint: Shape of the joint when its neck collapsed; its verdict and history are kept.
         solder: Contact angles and fluid.
         drops: Flow and run of each drop, as returned by ``split_to_rest``.
     """

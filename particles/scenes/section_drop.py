@@ -23,6 +23,9 @@ def start_section(drop: Drop, solder: Solder, effects: dict[str, bool]) -> Secti
         drop: Drop with the kind of its section, plane or axisymmetric, and its resolution.
         solder: Fluid and numerics.
         effects: Name -> on or off; missing effects are off.
+
+    Returns:
+        Flow at time 0, whose free surface is a polyline in the plane of the section.
     """
     if drop.section == "plane":
         polyline, width = Polyline.plane(is_closed=False, depth=drop.edge), 0.5 * drop.edge

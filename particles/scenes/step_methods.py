@@ -40,7 +40,7 @@ class StepMethod:
 
 
 def has_motion(effects: Mapping[str, bool]) -> bool:
-    """Return whether inertia or viscosity acts, which have no effect at rest."""
+    """Return whether inertia or viscosity acts, which have no effect at rest; name -> on or off."""
     return any(effects.get(name, False) for name in AT_REST)
 
 
@@ -64,6 +64,9 @@ def step_method(solder: Solder, effects: Mapping[str, bool]) -> StepMethod:
     Args:
         solder: Solder with the selected scheme.
         effects: Name -> on or off; missing effects are off.
+
+    Returns:
+        Method with its name and the functions that build its step solver and its events.
     """
     return next(m for m in STEP_METHODS if m.scheme == solder.numerics.scheme and m.applies(effects))
 

@@ -94,7 +94,7 @@ def line_normals(line: Floats) -> Floats:
     Their length is half the distance between the two neighbours of each vertex.
 
     Args:
-        line: Vertices of the contact line, shape (k, 3) [m].
+        line: Vertices of the closed contact line in order, the liquid to the left, shape (k, 3) [m].
     """
     along = np.roll(line, -1, axis=0) - np.roll(line, 1, axis=0)
     return 0.5 * np.stack((along[:, 1], -along[:, 0]), axis=1)
@@ -111,7 +111,8 @@ def contact_cosines(lowest: float, highest: float, outward: Floats, push: Floats
     Args:
         lowest: Cosine of the advancing angle.
         highest: Cosine of the receding angle.
-        outward: Normals within the wall, as ``line_normals`` returns them, shape (k, 2) [m].
+        outward: Outward normals within the wall, as long as half the distance between the neighbours of each vertex,
+            shape (k, 2) [m].
         push: Forces on the vertices except the wall force, over the surface tension, shape (k, 2) [m].
         drift: Velocities of the vertices over the sliding velocity, shape (k, 2).
     """
@@ -130,6 +131,6 @@ def divide_by_sliding_velocity(velocities: Floats, tension: float, law: Law) -> 
     Args:
         velocities: Velocities of the vertices, shape (m, 3) [m/s].
         tension: Surface tension [N/m].
-        law: Parameters of the pair interactions.
+        law: Parameters of the pair interactions, among them smoothing length, density and speed of sound.
     """
     return velocities[:, :2] * (law.rest_density * law.length * law.sound / tension)

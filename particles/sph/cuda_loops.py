@@ -40,9 +40,10 @@ def fields_of(state, walls):
     """Return the rows of two device arrays as ``Fields``, without copying, within a CUDA kernel.
 
     Args:
-        state: Values of all particles, shape (13, n): x, y, z, u, v, w, density, pressure, mass, density gradient (3)
-            and viscosity.
-        walls: Values of the wall particles, shape (5, m): velocity (3), room and share.
+        state: Values of all particles, shape (13, n): x, y, z [m], u, v, w [m/s], density [kg/m^3], pressure [Pa], mass
+            [kg], density gradient (3) [kg/m^4] and viscosity [Pa s].
+        walls: Values of the wall particles, shape (5, m): velocity (3) [m/s]; share of the kernel about the particle
+            that liquid can fill (``Fields.wall_room``); weight of the particle (``Fields.wall_share``).
     """
     return Fields(
         state[0], state[1], state[2], state[3], state[4], state[5], state[6], state[7], state[8], state[9], state[10],
@@ -72,7 +73,8 @@ def loops_of(law: Law) -> Loops:
         law: Parameters of the pair interactions.
 
     Returns:
-        Kernels for ``launch``; the arguments of each are listed in ``Loops``.
+        Nine CUDA kernels, each a loop over particles: steps of the motion (predict, settle, correct, take_slopes,
+        shift), rates, viscosities, drifts and values of walls. ``launch`` runs them; ``Loops`` lists their arguments.
     """
     return Loops(*_motion_kernels(law), *_pair_sum_kernels(law))
 

@@ -81,17 +81,18 @@ def run_flow(
     progress: Callable[[float], None] | None = None,
     checkpoint: Checkpoint | None = None,
 ) -> FlowRun:
-    """Run a simulation to a final time with about ``SAMPLES`` rows of history and ``PICTURES`` pictures.
+    """Run a simulation to a final time with about 2000 rows of history and 24 pictures (snapshots of the particles).
 
     Args:
         simulation: Simulation in its initial state; advanced in place.
         until: Final time [s].
         sample: Function of the simulation that returns a row of the history, the time [s] first.
-        progress: Function called with the completed fraction, 0 to 1.
-        checkpoint: Checkpoint to continue from, with identical bits, and to write.
+        progress: Function called after each step with the completed fraction, 0 to 1; None for no call.
+        checkpoint: Checkpoint that is written whenever it is due; a saved state in it is continued with identical bits.
+            None for no checkpoint.
 
     Returns:
-        Simulation at the final time, rows of the history, pictures and wall time.
+        Simulation at the final time, rows of the history (as ``sample`` returned them), pictures and wall time [s].
 
     Raises:
         FloatingPointError: A position is not finite.
@@ -134,7 +135,8 @@ def _flow_until(
 def device_of(scene: FlowScene) -> Callable[[Fields, int, Law], Particles]:
     """Return the class of particles for the device of a flow; CUDA is imported only if it is requested.
 
-    The class takes the initial fields, the number of liquid particles and the law.
+    The class takes the initial ``Fields``, the number of liquid particles and the ``Law``; its objects move the
+    particles in parallel on threads, or on a GPU if the numerical parameters of the scene name the device "cuda".
 
     Raises:
         NoDeviceError: The machine has no CUDA device.
@@ -189,7 +191,8 @@ def shear_law(scene: FlowScene) -> dict[str, Any]:
     """Return the entries of ``Law`` for a shear-dependent viscosity, neutral ones without it.
 
     Returns:
-        ``rheology``, ``exponent``, ``shear_rate`` [1/s], ``least_viscosity`` and ``most_viscosity`` [Pa s].
+        Dict of ``rheology`` (number of the viscosity law), ``exponent``, ``shear_rate`` [1/s], ``least_viscosity`` and
+            ``most_viscosity`` [Pa s].
     """
     rheology = scene.rheology
     if rheology is None or not decide_flow(scene)["shear_dependent_viscosity"]["on"]:
@@ -253,7 +256,8 @@ def result_of(run: FlowRun, history: dict[str, Floats], metrics: Metrics) -> Flo
     Args:
         run: Finished run.
         history: Column name -> samples over time, shape (n,).
-        metrics: Metric name -> (value, unit) of this kind of flow; volume drift, counts and timings are added.
+        metrics: Metric name -> (value, unit) of this kind of flow. Added are ``volume_drift`` (relative change of
+            volume), ``particles``, ``steps``, ``particle_steps_per_second`` [1/s] and ``seconds`` (wall time) [s].
     """
     simulation = run.simulation
     fluids, fields = simulation.fluids, simulation.fields

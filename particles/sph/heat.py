@@ -31,8 +31,8 @@ def temperature_laplacian(i, neighbours, fields, temperatures, law):
     """Return the Laplacian of the temperature over the density at a particle, a scalar [K m/kg].
 
     Args:
-        i: Particle.
-        neighbours: Neighbours of the particle, shape (k,), which include itself because of its image.
+        i: Number of the particle, integer.
+        neighbours: Numbers of its neighbours, shape (k,), which include itself because of its image.
         fields: ``Fields`` of all particles.
         temperatures: Temperatures of all particles, row 0, and of their mirror images, row 1, shape (2, n) [K].
         law: ``Law`` of the particles.

@@ -12,11 +12,13 @@ def predict(i, fields, rates, middle, time_step):
     """Move a particle over a time step and predict its velocity and density from the last rates.
 
     Args:
-        i: Particle.
+        i: Number of the particle, integer.
         fields: ``Fields`` of all particles.
-        rates: Rates as ``rates_of`` returns them, shape (10, n).
-        middle: Values in the middle of the step, shape (7, n), of which the first four rows are written.
-        time_step: Time step [s].
+        rates: Rates, shape (10, n): density rate [kg/(m^3 s)], acceleration (3) [m/s^2], density gradient (3) [kg/m^4],
+            concentration gradient (3) [1/m].
+        middle: Values in the middle of the step, shape (7, n); velocity (3) [m/s] and density [kg/m^3] are written to
+            the first four rows.
+        time_step: Time step, scalar [s].
     """
     half = 0.5 * time_step
     u, v, w = fields.u[i] + half * rates[1, i], fields.v[i] + half * rates[2, i], fields.w[i] + half * rates[3, i]
@@ -36,9 +38,9 @@ def settle(i, fields, middle, law):
     """Reflect a particle that crossed the mirror and compute its pressure from its density.
 
     Args:
-        i: Particle.
+        i: Number of the particle, integer.
         fields: ``Fields`` of all particles; those of particle i change.
-        middle: Values in the middle of the step, shape (7, n), whose velocity along z is reflected, too.
+        middle: Values in the middle of the step, shape (7, n), whose velocity along z, row 2, is reflected, too.
         law: ``Law`` of the particles.
     """
     middle[2, i] *= reflect(i, fields, law)
@@ -52,7 +54,7 @@ def reflect(i, fields, law):
     The code has no branch, since with a branch threads would count references to all fields for every particle.
 
     Args:
-        i: Particle.
+        i: Number of the particle, integer.
         fields: ``Fields`` of all particles; position, velocity and density gradient along z may change sign.
         law: ``Law`` of the particles; without a mirror nothing changes.
     """
@@ -68,11 +70,12 @@ def correct(i, fields, rates, middle, time_step):
     """Complete the time step of a particle with the rates at its end and store the density gradient.
 
     Args:
-        i: Particle.
+        i: Number of the particle, integer.
         fields: ``Fields`` of all particles; velocity, density and density gradient of particle i change.
-        rates: Rates as ``rates_of`` returns them, shape (10, n).
+        rates: Rates, shape (10, n): density rate [kg/(m^3 s)], acceleration (3) [m/s^2], density gradient (3) [kg/m^4],
+            concentration gradient (3) [1/m].
         middle: Velocity (3) and density in the middle of the step in the first four rows, shape (7, n).
-        time_step: Time step [s].
+        time_step: Time step, scalar [s].
     """
     half = 0.5 * time_step
     fields.u[i] = middle[0, i] + half * rates[1, i]
@@ -87,9 +90,10 @@ def take_slope(i, fields, rates):
     """Store the density gradient of a particle for the next step.
 
     Args:
-        i: Particle.
+        i: Number of the particle, integer.
         fields: ``Fields`` of all particles; the density gradient of particle i changes.
-        rates: Rates as ``rates_of`` returns them, shape (10, n); rows 4 to 6 are used.
+        rates: Rates, shape (10, n): density rate [kg/(m^3 s)], acceleration (3) [m/s^2], density gradient (3) [kg/m^4],
+            concentration gradient (3) [1/m]; rows 4 to 6 are used.
     """
     fields.slope_x[i], fields.slope_y[i], fields.slope_z[i] = rates[4, i], rates[5, i], rates[6, i]
 
@@ -99,9 +103,10 @@ def shift(i, fields, rates, factor, law):
     """Shift a particle against the concentration gradient (Sun et al. 2017), and reflect it at the mirror.
 
     Args:
-        i: Particle.
+        i: Number of the particle, integer.
         fields: ``Fields`` of all particles; the position of particle i changes.
-        rates: Rates as ``rates_of`` returns them, shape (10, n); rows 7 to 9 are used.
+        rates: Rates, shape (10, n): density rate [kg/(m^3 s)], acceleration (3) [m/s^2], density gradient (3) [kg/m^4],
+            concentration gradient (3) [1/m]; rows 7 to 9 are used.
         factor: Factor of the gradient, a scalar [m^2].
         law: ``Law`` of the particles.
     """
@@ -113,7 +118,7 @@ def shift(i, fields, rates, factor, law):
 
 @compiled
 def speed2_of(i, fields):
-    """Return the squared speed of a particle [m^2/s^2]."""
+    """Return the squared speed of particle ``i``, an integer, in its ``Fields``; a scalar [m^2/s^2]."""
     return fields.u[i] * fields.u[i] + fields.v[i] * fields.v[i] + fields.w[i] * fields.w[i]
 
 
@@ -122,10 +127,10 @@ def cover(k, i, fields, found, law):
     """Write the values of a wall particle to the fields; its density follows from its pressure.
 
     Args:
-        k: Number among the wall particles.
-        i: Number among all particles.
+        k: Number among the wall particles, integer.
+        i: Number among all particles, integer.
         fields: ``Fields`` of all particles; changed in place.
-        found: Pressure [Pa], velocity (3) [m/s] and weight, as ``wall_values`` returns them.
+        found: Pressure [Pa], velocity along x, y, z [m/s] and weight (0 to 1) of the particle, a tuple of five scalars.
         law: ``Law`` of the particles.
     """
     pressure, u, v, w, share = found

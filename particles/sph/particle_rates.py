@@ -25,17 +25,17 @@ summed = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", 
 
 @compiled
 def periods_of(law):
-    """Return (period [m], 1 / period) of a ``Law`` for each of x, y and z; zeros if not periodic."""
+    """Return three pairs (period [m], 1 / period [1/m]) of a ``Law``, for x, y and z; (0, 0) if not periodic."""
     x, y, z = law.period_x, law.period_y, law.period_z
     return (x, 1.0 / x if x > 0.0 else 0.0), (y, 1.0 / y if y > 0.0 else 0.0), (z, 1.0 / z if z > 0.0 else 0.0)
 
 
 @compiled
 def constants_of(law):
-    """Return constants of all pairs.
+    """Return five constants of all pairs from a ``Law``, a tuple.
 
-    These are: whether the flow has one dimension, 1 / h, the factor of the kernel gradient, the softening of viscosity
-    [m^2], and sigma over W at one spacing.
+    These are: whether the flow has one dimension, 1 / h [1/m], the factor sigma / h^2 of the kernel gradient, the
+    softening 0.01 h^2 of viscosity [m^2], and sigma over W at one spacing.
     """
     line, inverse = law.dimension == 1, 1.0 / law.length
     scale, softening = law.norm * inverse * inverse, pair_terms.SOFTENING * law.length * law.length
@@ -46,7 +46,8 @@ def constants_of(law):
 def across(distance, period):
     """Return a component of the vector between two particles [m] for the nearest periodic image.
 
-    ``distance`` is the difference of their coordinates [m], ``period`` the period [m] and its inverse, or zeros.
+    ``distance`` is the difference of their coordinates, a scalar [m]; ``period`` the pair (period [m], 1 / period
+    [1/m]), (0, 0) if not periodic.
     """
     return distance - period[0] * floor(distance * period[1] + 0.5)
 
@@ -57,10 +58,10 @@ def apart(place, j, side, fields, periods):
 
     Args:
         place: Position (x, y, z) [m].
-        j: Particle.
+        j: Number of the particle, integer.
         side: 1 for the particle, -1 for its image behind the plane z = 0.
         fields: ``Fields`` of all particles.
-        periods: Periods that ``periods_of`` returns.
+        periods: Pairs (period [m], 1 / period [1/m]) for x, y and z, (0, 0) if not periodic.
     """
     dx = across(place[0] - fields.x[j], periods[0])
     dy = across(place[1] - fields.y[j], periods[1])
@@ -77,7 +78,7 @@ def positive(value):
 def liquid_among(neighbours, fluids):
     """Return the number of liquid particles in a row, in which they come first, by bisection.
 
-    Particles with numbers below ``fluids`` are liquid.
+    ``neighbours (k,)`` has their numbers; those below the integer ``fluids`` are liquid.
     """
     first, last = 0, len(neighbours)
     while first < last:
@@ -94,7 +95,7 @@ def closing_in(k, velocity, d, fields):
     """Return (u_i - u_j) . d for a wall particle, doubled for weighted ones, which act as mirror images [m^2/s].
 
     Args:
-        k: Number among the wall particles.
+        k: Number among the wall particles, integer.
         velocity: Velocity u_i (x, y, z) [m/s].
         d: Vector (x, y, z) from the wall particle to i [m].
         fields: ``Fields`` of all particles.
@@ -106,13 +107,13 @@ def closing_in(k, velocity, d, fields):
 
 @compiled
 def pulls_not(law):
-    """Return whether walls exert no tension on liquid: with a free surface that is not tracked."""
+    """Return whether walls exert no tension on liquid, as a boolean: if the ``Law`` has an untracked free surface."""
     return law.has_surface and not law.tracked
 
 
 @compiled
 def own_viscosity(i, fields, law):
-    """Return the viscosity of a particle [Pa s]; 0 if viscosity does not act."""
+    """Return the viscosity of particle ``i`` of ``Fields`` [Pa s], a scalar; 0 if viscosity does not act."""
     return positive(fields.viscosity[i] if law.rheology else law.viscosity)
 
 
@@ -123,9 +124,9 @@ def rates_of(i, fluids, neighbours, fields, law):
     A particle is in its own row because of its mirror image; the pair with itself contributes nothing.
 
     Args:
-        i: Particle.
-        fluids: Number of liquid particles.
-        neighbours: Row of the particle, liquid neighbours first.
+        i: Number of the particle, integer.
+        fluids: Number of liquid particles, integer.
+        neighbours: Numbers of its neighbours, liquid ones first, shape (k,).
         fields: ``Fields`` of all particles.
         law: ``Law`` of the particles.
 
@@ -240,7 +241,8 @@ def _by_walls(i, fluids, neighbours, fields, law):
 def drift_of(i, fluids, neighbours, fields, law):
     """Return the velocity (x, y, z) [m/s] that XSPH adds when it moves a liquid particle; momentum does not change.
 
-    Arguments as in ``rates_of``.
+    ``i`` is the particle, ``fluids`` the number of liquid particles (integers), ``neighbours (k,)`` its neighbours,
+    liquid ones first, ``fields`` and ``law`` the ``Fields`` and ``Law`` of all particles.
     """
     x, y, z, u, v, w = fields.x[i], fields.y[i], fields.z[i], fields.u[i], fields.v[i], fields.w[i]
     periods = periods_of(law)
@@ -264,9 +266,9 @@ def solved(moments, sums, dimension):
     """Return the gradient (x, y, z) ``moments^-1 sums``, in a plane with x and z only; zero if not resolved.
 
     Args:
-        moments: Entries xx, yy, zz, xy, yz and xz of a symmetric matrix.
-        sums: Right-hand side (x, y, z).
-        dimension: Dimension of the flow, 1 to 3.
+        moments: Entries xx, yy, zz, xy, yz and xz of a symmetric matrix, six scalars.
+        sums: Right-hand side (x, y, z), three scalars.
+        dimension: Dimension of the flow, 1 (along x), 2 (x and z) or 3.
     """
     xx, yy, zz, xy, yz, xz = moments
     bx, by, bz = sums
@@ -294,7 +296,8 @@ def fitted_slope(i, neighbours, fields, law):
     """Return the slope (x, y, z) of the linear least-squares fit to the densities of a particle's neighbours [kg/m^4].
 
     With the weights W V it solves the 4 x 4 system of Belytschko et al. (1998), with the first row eliminated. It is
-    zero if neighbours do not resolve it (Shepard interpolation). Arguments as in ``rates_of``.
+    zero if neighbours do not resolve it (Shepard interpolation). ``i`` is the particle, an integer; ``neighbours (k,)``
+    are its liquid neighbours, ``fields`` and ``law`` the ``Fields`` and ``Law`` of all particles.
     """
     x, y, z, density = fields.x[i], fields.y[i], fields.z[i], fields.density[i]
     periods, inverse = periods_of(law), 1.0 / law.length
@@ -332,7 +335,7 @@ def condition_of(moments, dimension):
     """Return an upper bound of the condition number of a symmetric matrix; infinite if singular.
 
     The largest eigenvalue is at most the trace, and the middle one at most half of it. In a plane only x and z count.
-    ``moments`` are its entries xx, yy, zz, xy, yz, xz; ``dimension`` is that of the flow, 1 to 3.
+    ``moments`` are its entries xx, yy, zz, xy, yz, xz; ``dimension`` counts those of the flow, 1 to 3.
     """
     xx, yy, zz, xy, yz, xz = moments
     if dimension == 1:
@@ -350,7 +353,9 @@ def wall_values(i, fluids, neighbours, fields, law):
 
     The pressure is extrapolated from the liquid with its hydrostatic part (Adami et al. 2012). With a free surface that
     is not tracked it is not negative. The velocity is twice the wall's minus the mean of the liquid, which gives the
-    wall's velocity at its face. The weight is ``Fields.wall_share``. Arguments as in ``rates_of``; ``i`` counts all
+    wall's velocity at its face. The weight is the liquid within the kernel over ``Fields.wall_room``, at most 1.
+    ``i`` (integer, counting all particles) is the wall particle, ``fluids`` the number of liquid particles,
+    ``neighbours (k,)`` its neighbours, liquid ones first, ``fields`` and ``law`` the ``Fields`` and ``Law`` of all
     particles.
     """
     x, y, z = fields.x[i], fields.y[i], fields.z[i]

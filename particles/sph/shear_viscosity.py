@@ -38,14 +38,14 @@ def viscosity_at(rate, law):
 
 @summed
 def viscosity_of(i, fluids, neighbours, fields, law):
-    """Return the viscosity [Pa s] of a liquid particle from the renormalised velocity gradient.
+    """Return the viscosity [Pa s] of a liquid particle from the renormalised velocity gradient, a scalar.
 
     Wall particles count, with their extrapolated velocities, at no-slip walls only.
 
     Args:
-        i: Particle.
-        fluids: Number of liquid particles.
-        neighbours: Row of the particle, liquid neighbours first, shape (k,).
+        i: Number of the particle, integer.
+        fluids: Number of liquid particles, integer.
+        neighbours: Numbers of its neighbours, liquid ones first, shape (k,).
         fields: ``Fields`` of all particles.
         law: ``Law`` of the particles, with the viscosity law.
     """

@@ -37,8 +37,8 @@ def shape(kernel, line, q):
 
     Args:
         kernel: ``CUBIC_SPLINE`` or ``WENDLAND_C2``.
-        line: Whether the flow has one dimension.
-        q: Distance over the smoothing length, >= 0; W vanishes from q = 2.
+        line: Whether the flow has one dimension, a boolean.
+        q: Distance over the smoothing length, scalar >= 0; W vanishes from q = 2.
     """
     rest, half = 2.0 - q, 1.0 - 0.5 * q
     spline = 1.0 - 1.5 * q * q * half if q < 1.0 else 0.25 * rest * rest * rest
@@ -49,12 +49,12 @@ def shape(kernel, line, q):
 
 @njit(cache=True, error_model="numpy")
 def slope(kernel, line, q):
-    """Return (dW / dq) / (sigma q); grad W is this times sigma / h^2 times the vector between the points.
+    """Return (dW / dq) / (sigma q), a scalar; grad W is this times sigma / h^2 times the vector between the points.
 
     Args:
         kernel: ``CUBIC_SPLINE`` or ``WENDLAND_C2``.
-        line: Whether the flow has one dimension.
-        q: Distance over the smoothing length h, >= 0; the slope vanishes from q = 2.
+        line: Whether the flow has one dimension, a boolean.
+        q: Distance over the smoothing length h, scalar >= 0; the slope vanishes from q = 2.
     """
     rest, half = 2.0 - q, 1.0 - 0.5 * q
     spline = -3.0 + 2.25 * q if q < 1.0 else -0.75 * rest * rest / q

@@ -111,7 +111,7 @@ def find_near_vertices(vertices: Floats, particles: Floats, reach: float) -> tup
         reach: Search radius [m].
 
     Returns:
-        Offsets (m + 1,) and indices in compressed rows.
+        Compressed rows: offsets, shape (m + 1,), and particle numbers, shape (pairs,); no row is empty.
     """
     offsets, indices = find_near(vertices, particles, reach)
     is_alone = np.diff(offsets) == 0
@@ -128,12 +128,12 @@ def find_weights(points, lists, fields, law, weights):
 
     Args:
         points: Vertices, shape (m, 3) [m].
-        lists: Offsets and indices of the particles near each vertex.
+        lists: Particles near each vertex in compressed rows: offsets, shape (m + 1,), and indices, shape (pairs,).
         fields: ``Fields`` of the particles.
         law: ``Law`` of the particles.
-        weights: Output, shape (2, 2, pairs). Row 1 has W [1/m^3] for components along a wall and, with reversed images,
-            across it; row 0 the same over the sum of W along the wall at the vertex. Without a particle within the
-            support the nearest one has the whole weight.
+        weights: Output, shape (2, 2, pairs). ``weights[1]`` is W [1/m^3], mirror images added (``[1, 0]``, for
+            components along the wall z = 0) or subtracted (``[1, 1]``, across it); ``weights[0]`` is the same over the
+            sum of W at the vertex. Without a particle within the support the nearest one has the whole weight.
 
     Returns:
         Sum of W at each vertex, shape (m,) [1/m^3].
@@ -171,7 +171,7 @@ def carry(lists, shares, velocity, time_step, points):
         lists: Offsets, shape (m + 1,), and indices of the particles near each vertex, shape (pairs,).
         shares: Weights along and across the wall, shape (2, pairs); they sum to at most one at each vertex.
         velocity: Velocities of the particles, shape (3, n) [m/s].
-        time_step: Time step [s].
+        time_step: Time step, scalar [s].
         points: Vertices, shape (m, 3) [m]; moved in place.
     """
     offsets, indices = lists
@@ -188,10 +188,11 @@ def distribute(lists, weights, vectors, result):
     """Distribute vectors at the vertices to the particles.
 
     Args:
-        lists: Offsets and indices of the particles near each vertex.
-        weights: Weights for each kind of vector along and across the wall, shape (k, 2, pairs).
-        vectors: Kinds of vectors at the vertices, shape (k, m, 3). One thread sums each kind, in one order.
-        result: Sums at the particles, shape (k, 3, n), to which is added.
+        lists: Particles near each vertex in compressed rows: offsets, shape (m + 1,), and indices, shape (pairs,).
+        weights: Weights of each kind of vector, for components along (x, y) and across (z) the wall, (k, 2, pairs).
+        vectors: Kinds of vectors at the vertices, such as forces, shape (k, m, 3). One thread sums each kind, in one
+            order.
+        result: Sums at the particles in the unit of the vectors, shape (k, 3, n), to which is added.
     """
     offsets, indices = lists
     for kind in prange(vectors.shape[0]):
@@ -209,12 +210,12 @@ def find_distances_to_cover(vertices, lists, fields, cover, distances):
     """Compute how far vertices have to move along their normals to lie just beyond the particles near them.
 
     Args:
-        vertices: Points (m, 3) [m] and outward unit normals (m, 3).
-        lists: Offsets and indices of the particles near each vertex.
+        vertices: Points, shape (m, 3) [m], and outward unit normals, shape (m, 3); a tuple.
+        lists: Particles near each vertex in compressed rows: offsets, shape (m + 1,), and indices, shape (pairs,).
         fields: ``Fields`` of the particles.
-        cover: Least and largest distance of the surface beyond a particle [m]; half the curvature of the surface about
-            a particle [1/m]; distance outside a vertex from which on particles are left out [m].
-        distances: Output, shape (m,) [m].
+        cover: Four scalars: least and largest distance of the surface beyond a particle [m]; half the curvature of the
+            surface about a particle [1/m]; distance outside a vertex from which on particles are left out [m].
+        distances: Output, shape (m,) [m], positive outwards.
     """
     (points, normals), (offsets, indices), (least, most, bend, before) = vertices, lists, cover
     for v in prange(points.shape[0]):

@@ -29,17 +29,18 @@ LEVEL, MOST = 0.7, 0.5
 def sum_film_surface(
     points: Floats, normals: Floats, lists: tuple[Indices, Indices], kernel: Floats, particles: int
 ) -> Floats:
-    """Sum the surface near each particle.
+    """Sum the kernel over the surface vertices near each particle, to recognise films and measure their height.
 
     Args:
         points: Vertices, shape (m, 3) [m].
         normals: Outward unit normals, shape (m, 3), along the wall on contact lines.
-        lists: Offsets and indices of the particles near each vertex.
+        lists: Particles near each vertex in compressed rows: offsets, shape (m + 1,), and indices, shape (pairs,).
         kernel: Kernel between each vertex and its particles, shape (pairs,) [1/m^3].
         particles: Number of all particles.
 
     Returns:
-        Kernel summed over all vertices, over level ones, and the latter times their height, shape (3, particles).
+        Rows, shape (3, particles): kernel summed over all vertices [1/m^3], over level ones (vertical component of the
+        normal above 0.7) [1/m^3], and over level ones times their height [1/m^2].
     """
     sums = np.zeros((3, particles))
     _sum_surface(points, normals, lists, kernel, sums)
@@ -65,10 +66,12 @@ def add_wall_friction(sums: Floats, fields: Fields, law: Law, rates: Floats) -> 
     """Subtract the missing friction of the wall z = 0 from the accelerations of particles in films.
 
     Args:
-        sums: Surface near each particle, as ``sum_film_surface`` returns it, shape (3, particles).
+        sums: Kernel summed over all surface vertices, over level ones [1/m^3], and over level ones times their height
+            [1/m^2], shape (3, particles).
         fields: Fields of all particles.
         law: Parameters of the pair interactions.
-        rates: Rates of the liquid, shape (10, n); rows 1 and 2 change.
+        rates: Rates of the n liquid particles, shape (10, n); rows 1 and 2, the acceleration along x and y [m/s^2],
+            change.
     """
     for i in range(rates.shape[1]):
         z = fields.z[i]

@@ -34,7 +34,7 @@ def liquid_first(row, fluids):
 
     Args:
         row: Numbers of the neighbours, shape (k,).
-        fluids: Number of liquid particles; smaller numbers are liquid.
+        fluids: Number of liquid particles, integer; particles with smaller numbers are liquid.
     """
     front = 0
     for k in range(row.shape[0]):

@@ -155,7 +155,7 @@ def smooth_surface(body: Body, physics: Physics, volume: float, smoothing: MeshS
 
     Args:
         body: Liquid body; changed in place.
-        physics: Effects that act on the body.
+        physics: Effects that act on the body, with contact lines, whose pinning changes.
         volume: Enclosed volume [m^3].
         smoothing: Passes, flips and the highest energy.
 

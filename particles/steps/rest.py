@@ -151,6 +151,9 @@ def run_to_rest(
         on_snapshot: Function called with each new snapshot.
         checkpoint: Checkpoint from which the run continues to the bit, and to which it writes its state.
 
+    Returns:
+        Record and profile of each step, snapshots, and whether the neck ruptured or the body came to rest.
+
     Raises:
         NotAtRest: The body is not at rest after the allowed steps.
     """
@@ -187,6 +190,10 @@ def _start(flow: LiquidFlow, on_snapshot: Callable[[Snapshot], None] | None, che
 
 def saved_run(flow: LiquidFlow, run: Run) -> dict[str, Any]:
     """Return the data that a checkpoint keeps of a flow and its run; its dataclasses are ``RECORDS``.
+
+    Args:
+        flow: Flow, of which body, physics and step solver are saved.
+        run: Records, profiles and snapshots so far.
 
     Returns:
         State of the flow under ``flow`` and of the run under ``run``.
@@ -268,8 +275,10 @@ def _motion(record: StepRecord, rule: StopRule) -> float:
 def is_calm(records: Sequence[StepRecord], rule: StopRule) -> bool:
     """Return whether the surface and the energy hardly changed in the last step.
 
+    False before the second step.
+
     Args:
-        records: Records of the steps.
+        records: Records of the steps so far, in order; the last two are compared.
         rule: Limits of displacement and energy change.
     """
     if len(records) < 2:

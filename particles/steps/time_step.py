@@ -69,7 +69,7 @@ def most_steps(solder: Solder, spacing: float) -> int:
     """Return the number of steps after which a run to rest has failed, from the case or estimated for the scheme.
 
     Args:
-        solder: Solder of the case.
+        solder: Solder of the case; its ``numerics.max_steps`` is returned unless it is None.
         spacing: Particle spacing [m].
     """
     numerics = solder.numerics

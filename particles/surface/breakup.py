@@ -82,7 +82,12 @@ def measure_parts(points: Floats, triangles: Indices) -> tuple[Indices, Floats]:
 
 
 def find_largest_part(points: Floats, triangles: Indices) -> Floats:
-    """Return the vertices (k, 3) [m] of the part with the largest volume; arguments as for ``measure_parts``."""
+    """Return the vertices (k, 3) [m] of the part with the largest volume.
+
+    Args:
+        points: Vertices, shape (m, 3) [m].
+        triangles: Outward oriented triangles, shape (t, 3); the wall z = 0 closes the surface.
+    """
     part, volumes = measure_parts(points, triangles)
     return points[np.unique(triangles[part == volumes.argmax()])]
 

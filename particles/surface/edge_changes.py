@@ -40,6 +40,8 @@ class NewSurface:
 def extreme_edges(points, triangles):
     """Return the lengths of the shortest and the longest edge of a triangulation [m], in this order.
 
+    Both are scalars.
+
     Args:
         points: Vertices, shape (n, 3) [m].
         triangles: Triangles, shape (t, 3); inf and 0 are returned without any.
@@ -86,9 +88,12 @@ def split_long(
     Args:
         points: Vertices, shape (n, 3) [m].
         triangles: Triangles, shape (t, 3).
-        rings: Contact lines.
+        rings: Contact lines as vertices in order, shape (k,) each; may be empty.
         longest: Length beyond which an edge is split [m].
         on_rings: Whether edges of contact lines are split, too.
+
+    Returns:
+        New triangulation: triangles, contact lines, and the two old vertices whose mean each new vertex is.
     """
     edges, sides = _edges(triangles)
     length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
@@ -126,9 +131,12 @@ def collapse_short(
     Args:
         points: Vertices, shape (n, 3) [m].
         triangles: Triangles, shape (t, 3).
-        rings: Contact lines.
+        rings: Contact lines as vertices in order, shape (k,) each; may be empty.
         shortest: Length below which an edge collapses [m].
         on_rings: Whether edges of contact lines collapse, too.
+
+    Returns:
+        New triangulation: triangles, contact lines, and the two old vertices whose mean each new vertex is.
     """
     edges, sides = _edges(triangles)
     length = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)

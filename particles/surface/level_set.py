@@ -64,7 +64,14 @@ def signed_distance(points: Floats, triangles: Indices, grid: Grid) -> LevelSet:
 
 
 def signed_distance_in_band(points: Floats, triangles: Indices, grid: Grid, band: float) -> LevelSet:
-    """Compute the signed distance as ``signed_distance`` does, limited to the half width ``band`` [m] in magnitude."""
+    """Compute the signed distance to a closed surface at the nodes of a grid, limited in magnitude, negative inside.
+
+    Args:
+        points: Vertices, shape (n, 3) [m].
+        triangles: Outward oriented triangles, shape (t, 3), that share the vertices of their edges.
+        grid: Grid of nodes.
+        band: Largest magnitude [m]; nodes farther from the surface get it with the sign of their side.
+    """
     distance = np.full(grid.shape, band)
     near_distance.lower_to_distance(points, triangles, grid.origin, grid.spacing, distance)
     return LevelSet(grid, np.where(winding_numbers_on(grid, points, triangles) > 0, -distance, distance))
@@ -126,6 +133,9 @@ def extract_surface(level: LevelSet) -> tuple[Floats, Indices]:
 
     Naive surface nets (Gibson 1998): a vertex in each cell that the surface crosses, at the mean of the crossings of
     its edges; two triangles across each edge of the grid that the surface crosses.
+
+    Args:
+        level: Values at the nodes of a grid, negative in the liquid.
 
     Returns:
         Vertices (n, 3) [m] and outward oriented triangles (t, 3), closed if the liquid is inside the grid.

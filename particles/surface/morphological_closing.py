@@ -78,6 +78,10 @@ def close_gaps(level: LevelSet, gap: float) -> LevelSet:
     """Return a level set whose gaps narrower than ``gap`` [m] are filled (morphological closing).
 
     For a negative ``gap`` liquid that is thinner than its magnitude is removed (morphological opening).
+
+    Args:
+        level: Values at the nodes of a grid, negative in the liquid; not changed.
+        gap: Width [m].
     """
     grid = level.grid
     surface, band = extract_surface(LevelSet(grid, level.values - 0.5 * gap)), 0.5 * abs(gap) + BAND * grid.spacing
@@ -123,5 +127,5 @@ def connected_groups(first: Indices, second: Indices, count: int) -> Indices:
 
 
 def count_parts(triangles: Indices) -> int:
-    """Return the number of connected parts of a surface whose vertices all have triangles."""
+    """Return the number of connected parts of a surface whose vertices all have triangles; shape (t, 3)."""
     return int(part_of_vertex(triangles, int(triangles.max()) + 1).max()) + 1

@@ -20,7 +20,7 @@ def lower_to_distance(points, triangles, origin, spacing, distance):
         points: Vertices, shape (n, 3) [m].
         triangles: Triangles, shape (t, 3).
         origin: Position of the first node, shape (3,) [m].
-        spacing: Distance between nodes [m].
+        spacing: Distance between nodes, a scalar [m].
         distance: Distances at the nodes, shape (i, j, k) [m], lowered in place; the largest is the width of the band.
     """
     band = distance.max()

@@ -114,6 +114,9 @@ def fit_profile(points: Floats, triangles: Indices, span: tuple[float, float] | 
         triangles: Outward oriented triangles of the free surface, shape (t, 3).
         span: Lowest and highest height of the fit [m]; by default of the vertices.
         parts: Number of parts like this one that planes of symmetry through the z axis make of the whole body.
+
+    Returns:
+        Radius of the disc of equal area by height, with the fitted areas of the cross-sections.
     """
     z = points[np.unique(triangles), 2]
     low, high = span or (float(z.min()), float(z.max()))
@@ -127,6 +130,9 @@ def fit_areas(areas: Callable[[Floats], Floats], low: float, high: float) -> Pro
         areas: Function of the heights.
         low: Lowest height [m].
         high: Highest height [m].
+
+    Returns:
+        Radius of the disc of equal area by height, with the fitted areas.
     """
     heights = 0.5 * (low + high) + 0.5 * (high - low) * NODES
     return Profile.of(Legendre.fit(heights, areas(heights), DEGREE, domain=[low, high]))

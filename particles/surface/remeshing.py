@@ -158,7 +158,11 @@ def _improve(mesh: SurfaceMesh) -> None:
 
 
 def has_narrow_gap(mesh: SurfaceMesh) -> bool:
-    """Return whether parts of a surface are closer than a particle spacing, measured outside the liquid."""
+    """Return whether parts of a surface are closer than a particle spacing, measured outside the liquid.
+
+    Args:
+        mesh: Surface with its particle spacing, and solid ground if there is one.
+    """
     gap = MERGE_GAP * mesh.spacing
     on_ground = mesh.ground is not None
     normals = vertex_normals(mesh.points, mesh.triangles, len(mesh.points)) if on_ground else mesh.normals()
@@ -195,7 +199,7 @@ def cover_dry_spots(
         spacing: Particle spacing [m].
 
     Returns:
-        New vertices and triangles; None without such spots.
+        New vertices, shape (k, 3) [m], and triangles, shape (s, 3); None without such spots.
     """
     spots = [ring for ring in rings if -(spacing**2) < area_within(points[ring]) < 0.0]
     if not spots:
@@ -239,7 +243,7 @@ def rebuild_from_distance(
             is thinner; 0 keeps the shape.
 
     Returns:
-        New vertices and triangles for the first width that works; None if no width works.
+        New vertices, shape (k, 3) [m], and triangles, shape (s, 3), for the first width that works; None if none does.
     """
     closed = with_mirror_image(points, triangles) if has_wall else (points, triangles)
     distance = signed_distance(*closed, Grid.around(closed[0], EDGE * spacing))

@@ -63,7 +63,13 @@ def _centroid_offsets(points, triangles, count):
 
 
 def vertex_normals(points: Floats, triangles: Indices, count: int) -> Floats:
-    """Return area-weighted outward unit normals of the first ``count`` points, shape (count, 3)."""
+    """Return area-weighted outward unit normals of the first ``count`` points, shape (count, 3).
+
+    Args:
+        points: Points, shape (n, 3) [m].
+        triangles: Outward oriented triangles, shape (t, 3), of vertices below ``count``.
+        count: Number of vertices, which come first.
+    """
     return _centroid_offsets(points, triangles, count)[1]
 
 

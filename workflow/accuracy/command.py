@@ -86,6 +86,9 @@ def read_request(case: Path, settings: Sequence[str], tolerance: str | None, bud
         tolerance: Value of ``--tolerance``, such as "2%".
         budget: Value of ``--budget``, such as "10min".
 
+    Returns:
+        Case file, settings, tolerance (None with a budget alone), budget [s] and command line.
+
     Raises:
         CaseError: A tolerance or a budget is invalid.
     """
@@ -139,7 +142,7 @@ def measure(
     """Run the missing parts of a case's convergence study, recommend settings, run them, and write ``accuracy.json``.
 
     Args:
-        request: Request of the user.
+        request: Case file, settings, tolerance and budget of the user.
         folder: Folder of the store and the results.
         compute: Function of a store and points that makes their products and returns reasons of failure by key.
         study: Convergence study; None for the study of the case's kind.
@@ -185,7 +188,7 @@ def show(request: AccuracyRequest, out: Path | None, console: Console) -> bool:
     """Run the command and print its results.
 
     Args:
-        request: Request of the user.
+        request: Case file, settings, tolerance and budget of the user.
         out: Output folder; None for the default one.
         console: Console to print to.
 
@@ -221,7 +224,11 @@ def show(request: AccuracyRequest, out: Path | None, console: Console) -> bool:
 
 
 def is_within_tolerance(accuracy: Accuracy) -> bool:
-    """Return whether the recommended settings were run and their measured error is within the user's tolerance."""
+    """Return whether the recommended settings were run and their measured error is within the user's tolerance.
+
+    Args:
+        accuracy: Convergence study; without a tolerance any measured error is accepted.
+    """
     chosen = accuracy.recommended
     if chosen is None or chosen.found is None or accuracy.judged not in chosen.found.errors:
         return False

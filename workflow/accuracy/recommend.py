@@ -48,10 +48,11 @@ def recommend(
     """Recommend settings, measured or interpolated between measured ones.
 
     Args:
-        study: Convergence study.
-        measurements: Name of run -> its measurement.
-        fits: Parameter -> fits of error and cost.
-        goal: Goal of the recommendation.
+        study: Convergence study with its varied parameters and its choices, such as solver or scheme.
+        measurements: Name of run -> its errors and costs.
+        fits: Parameter -> fits of error and cost over its values.
+        goal: Largest error (then the cheapest settings are sought), or None and the largest cost of a run
+            [core-seconds] (then the most accurate ones).
 
     Returns:
         Recommendation with the error and cost that the fits predict; for a choice without a size, with the measured

@@ -31,7 +31,8 @@ def needs_coarse_joints(coupling: "JointCoupling | None") -> bool:
     """Return whether a shock needs coarse joint meshes: for joints that are not fine, or for a one-way macro model.
 
     Args:
-        coupling: Coupling of the macro and the meso model; None, without a two-scale run, needs no coarse joints.
+        coupling: Coupling of the macro model (board) and the meso model (joints); None, without a two-scale run, needs
+            no coarse joints.
     """
     return coupling is not None and (coupling.fine_joints != "all" or coupling.direction == "one_way")
 
@@ -64,6 +65,9 @@ def named_joints(coupling: "JointCoupling") -> FineJoints:
 
     Args:
         coupling: Coupling whose ``fine_joints`` is "all" or a tuple of joint names.
+
+    Returns:
+        The same names, and the setting as text.
     """
     return FineJoints(coupling.fine_joints, f"{FINE} = {_in_words(coupling.fine_joints)}")
 
@@ -106,7 +110,11 @@ def write_fine_joints(folder: Path, fine: FineJoints) -> None:
 
 
 def read_fine_joints(folder: Path) -> FineJoints | None:
-    """Read ``fine_joints.json`` of a shock; None if it does not exist."""
+    """Read ``fine_joints.json`` of a shock; None if it does not exist.
+
+    Returns:
+        Names of the joints with a fine mesh, or "all", and the reason for the choice.
+    """
     path = folder / "fine_joints.json"
     if not path.exists():
         return None

@@ -62,7 +62,7 @@ class PackageForecast:
 
 
 def forecast_package(case: PackageCase) -> PackageForecast:
-    """Predict sizes and cost of the reflow of a package, without running it.
+    """Predict sizes and cost of the reflow of a package from its case, without running it.
 
     Returns:
         Number and particles of the joints, effects, and wall time of each stage [s]; ``parts`` is empty, ``shock``
@@ -108,7 +108,8 @@ def forecast_board_drop(case: BoardDropCase) -> PackageForecast:
     """Predict sizes, time steps and cost of reflow and shock, without running them.
 
     Returns:
-        As for ``forecast_package``, with the parts of the mesh and the forecast of the shock.
+        Number and particles of the joints, effects, wall time of each stage [s], elements and critical time step of
+        each part of the mesh, and scheme, time steps and wall times of the shock.
     """
     reflow = forecast_package(case)
     share = expected_duration(case) / longest_duration(case)
@@ -137,7 +138,9 @@ def forecast_board_drop(case: BoardDropCase) -> PackageForecast:
 
 
 def step_problems(case: BoardDropCase) -> Iterator[Problem]:
-    """Yield problems of too many time steps, and of a pulse or duration shorter than a coupling window.
+    """Yield problems of too many time steps, and of a pulse or duration shorter than a window.
+
+    A window is the time between two exchanges of the macro model (board) and the meso model (joints).
 
     Yields:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.

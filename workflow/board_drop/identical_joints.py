@@ -20,7 +20,11 @@ PREFIX = "identical_"  # begins the names of meshes and metrics of identical joi
 
 
 def identical_sphere(case: "PackageCase") -> "TruncatedSphere":
-    """Return the truncated sphere of the solder's volume between the wetted discs of the pads, equal for all joints."""
+    """Return the truncated sphere of the solder's volume between the wetted discs of the pads, equal for all joints.
+
+    Args:
+        case: Case with the volume of the solder, and the radii that it can wet on both pads.
+    """
     from reflowshock.meshing.surface.truncated_sphere import TruncatedSphere
 
     board, package = case.package.board_pad, case.package.package_pad

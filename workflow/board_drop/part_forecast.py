@@ -46,14 +46,22 @@ Parts = Mapping[str, PartForecast]
 
 
 def forecast_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
-    """Return the forecast of every part of the mesh with all joints fine, by name such as "solder_coarse"."""
+    """Return the forecast of every part of the mesh with all joints fine, by name such as "board" or "solder".
+
+    Returns:
+        Part name -> number of hexahedra, critical time step [s], cost of an update, and whether the forces are linear.
+    """
     from reflowshock.meshing.board.estimate import count_elements
 
     return _forecasts(case, count_elements(case.package, case.board, case.warpage))
 
 
 def two_scale_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
-    """Return the forecast of every part of a two-scale run by name; for a one-way run, the parts of both models."""
+    """Return the forecast of every part of a two-scale run by name; for a one-way run, the parts of both models.
+
+    Returns:
+        Part name -> number of hexahedra, critical time step [s], cost of an update, and whether the forces are linear.
+    """
     from reflowshock.meshing.board.estimate import count_elements
 
     if case.shock.coupling.direction == "one_way":
@@ -62,7 +70,12 @@ def two_scale_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
 
 
 def coarse_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
-    """Return the forecast of every part of the mesh with all joints coarse, by name."""
+    """Return the forecast of every part of the mesh with all joints coarse, by name.
+
+    Returns:
+        Part name, such as "solder_coarse" -> number of hexahedra, critical time step [s], cost of an update, and
+        whether the forces are linear.
+    """
     from reflowshock.meshing.board.estimate import count_elements
 
     return _forecasts(case, count_elements(case.package, case.board, case.warpage, 0))
@@ -135,7 +148,7 @@ def is_linear(parts: Parts) -> bool:
     """Return whether the forces of all parts are linear.
 
     Args:
-        parts: Forecast of each part by name.
+        parts: Forecast of each part by name, of which ``linear`` is read.
     """
     return all(part.linear for part in parts.values())
 

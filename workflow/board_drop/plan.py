@@ -21,7 +21,7 @@ def package_tables(case: PackageCase, outlook: PackageForecast) -> Iterator[Rend
 
     Args:
         case: Case of a package.
-        outlook: Forecast of the case.
+        outlook: Forecast of the case: number and particles of its joints, wall times.
 
     Yields:
         Lines of text for the terminal.

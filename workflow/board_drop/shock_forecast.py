@@ -123,7 +123,8 @@ def forecast_shock(case: "BoardDropCase", parts: Parts, share: float = 1.0) -> S
         share: Expected duration of the run over its longest duration, 0 to 1.
 
     Returns:
-        Scheme, step levels, and wall times of the two-scale run and of the DNS.
+        Coupling scheme with its reason, step levels, and wall times [s] of the two-scale run and of the DNS (one model
+        with all joints fine).
 
     Raises:
         CaseError: The critical steps differ by more than ``shock.coupling.levels`` levels allow.
@@ -197,6 +198,8 @@ def implicit_seconds(case: "BoardDropCase") -> float | None:
 def shorter_than_window(case: "BoardDropCase") -> Iterator[Problem]:
     """Yield the problem of a pulse, or a whole shock, that ends within the first window of the two-scale run.
 
+    A window is the time between two exchanges of the macro model (board) and the meso model (joints).
+
     Yields:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
     """
@@ -220,7 +223,7 @@ def estimate_mesh(case: "BoardDropCase", parts: Parts) -> "MeshEstimate":
 
     Args:
         case: Case of a board drop.
-        parts: Forecast of each part of the mesh by name.
+        parts: Number of elements and critical time step of each part of the mesh by name.
     """
     import numpy as np
 

@@ -32,6 +32,9 @@ def find_fine_joints(run: Run[BoardDropCase], folder: Path) -> FineJoints:
         run: Run folder with assembly and joints, case, cores.
         folder: Folder of the shock, into which the coarse run and ``fine_joints.json`` are written.
 
+    Returns:
+        Names of the joints with a fine mesh, or "all", and the reason for the choice.
+
     Raises:
         LaunchError: The run failed; the message contains its last lines.
     """
@@ -54,7 +57,7 @@ def run_mode(run: Run[BoardDropCase], folder: Path, mode: str, fine: FineJoints,
     Args:
         run: Run folder with assembly and joints, case, cores.
         folder: Folder for the products of the mode.
-        mode: "two_scale", or "dns" with all joints fine.
+        mode: "two_scale" (macro and meso model coupled), or "dns" (one model with all joints fine).
         fine: Fine joints of a two-scale run; ignored for "dns".
         prefix: Prefix of the names of the meshes; empty for real joints.
 

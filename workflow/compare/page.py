@@ -23,7 +23,12 @@ LINES = ("solid", "dashed", "dotted")
 
 
 def show(runs: Sequence[ComparedRun], console: Console) -> None:
-    """Print the parameters and results in which runs differ."""
+    """Print the parameters and the first results in which two or more runs differ, or that all are equal.
+
+    Args:
+        runs: Two or more runs; the first one is the reference of the changes.
+        console: Console to print to.
+    """
     changed, different = parameters(runs), select_differing(results(runs))
     console.print(_table(changed) if changed["rows"] else "all parameters are equal")
     console.print(
@@ -72,6 +77,10 @@ def write(runs: Sequence[ComparedRun], path: Path) -> None:
 
 def histories(runs: Sequence[ComparedRun]) -> list[Chart]:
     """Return charts of common histories: board centre, critical joint of the first run, watch points.
+
+    Args:
+        runs: Two or more runs; without a shock in one of them there are no charts.
+
 
     Returns:
         Interactive charts for the report page.

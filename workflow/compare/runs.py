@@ -52,6 +52,9 @@ class ComparedRun:
 def read_runs(folders: Sequence[Path]) -> list[ComparedRun]:
     """Read two or more run folders.
 
+    Returns:
+        Name, resolved case, summary and history arrays of each run, in the order of the folders.
+
     Raises:
         CaseError: Fewer than two folders, a repeated one, one that is not a run folder, or different kinds of case.
     """

@@ -166,7 +166,7 @@ def fit_measurements(study: ConvergenceStudy, measurements: Mapping[str, Measure
         measurements: Name of run -> its measurement.
 
     Returns:
-        Name of parameter -> fits.
+        Name of parameter -> fits of each error and of the cost over its values.
     """
     return {
         parameter.name: _fit(parameter.runs, parameter.order, study, measurements) for parameter in study.parameters

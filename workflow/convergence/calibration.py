@@ -63,7 +63,11 @@ def default_folder(case: Case) -> Path:
 
 
 def calibration_from_study(case: Case) -> Calibration | None:
-    """Return the corrections of predicted times by the study of a case; None if it was not run on this machine."""
+    """Return the corrections of predicted times by the study of a case; None if it was not run on this machine.
+
+    Returns:
+        Pairs of predicted and measured wall time [s] of each stage, from the study in the default folder.
+    """
     accuracy = read_accuracy(default_folder(case) / FILE)
     if accuracy is None or accuracy.machine != this_host():
         return None

@@ -39,8 +39,9 @@ def compute_errors(
     """Compute the errors of all runs.
 
     Args:
-        results: Name of a completed run -> its quantities.
-        runs: All runs.
+        results: Name of a completed run -> its quantities by name, each a value or an array, with the exact one if it
+            is known.
+        runs: All runs: name, parameter, value and settings.
         main: Runs of the first parameter, the coarsest first.
         order: Theoretical order of the error in that parameter; None without theory.
 

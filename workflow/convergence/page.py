@@ -81,7 +81,8 @@ def section_for(run_folder: Path, case: Case) -> dict | None:
         case: Case of the run.
 
     Returns:
-        Context of the study of the case, else of the study of a shipped case of the same kind; None without either.
+        Values of the template's variables by name, for the study of the case, else of a shipped case of the same kind;
+        None without either.
     """
     accuracy = read_case_accuracy(run_folder, case)
     if accuracy is not None:
@@ -94,7 +95,7 @@ def section_for(run_folder: Path, case: Case) -> dict | None:
 
 
 def markdown(accuracy: Accuracy) -> str:
-    """Return the tables of runs, orders and recommendation in Markdown."""
+    """Return the tables of runs, observed orders and recommendation of a convergence study in Markdown."""
     legend = tables.legend(accuracy).replace(tables.ON_FRONT, f"\\{tables.ON_FRONT}")
     blocks = [_markdown(tables.runs(accuracy)), f"{legend}.", _markdown(tables.orders(accuracy))]
     predicted = tables.prediction(accuracy)
@@ -111,6 +112,9 @@ def _markdown(table: dict) -> str:
 
 def charts(accuracy: Accuracy) -> list[Chart]:
     """Return charts of the judged error over wall time and over core-seconds, with run names as labels.
+
+    Args:
+        accuracy: Convergence study; failed and reference runs are left out.
 
     Returns:
         Interactive charts for the report page.

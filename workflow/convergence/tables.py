@@ -57,7 +57,8 @@ def runs(accuracy: Accuracy) -> dict:
         accuracy: Convergence study.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text); columns without any text are left out.
+        Table with ``head`` (column titles), ``rows`` (lists of text, one row per run, the cheapest first) and
+        ``prose``; columns without any text are left out.
     """
     best, usual = on_front(accuracy), usual_reference(accuracy)
     head = ["setting", *(short(name) for name in accuracy.errors), "wall s", "core s", ""]
@@ -113,7 +114,7 @@ def _remark(measurement: Measurement, accuracy: Accuracy, usual: str) -> str:
 
 
 def legend(accuracy: Accuracy) -> str:
-    """Return the explanation of marks and error names."""
+    """Return the explanation of marks, usual reference and error names below the table of runs, as one text."""
     names = [f"{short(name)}: {words}" for name, words in accuracy.errors.items() if short(name) != words]
     usual = usual_reference(accuracy)
     reference = [f"compared with {usual} unless stated otherwise"] if usual else []
@@ -158,7 +159,7 @@ def prediction(accuracy: Accuracy) -> dict | None:
         accuracy: Convergence study.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text): error and core-seconds; None if the
+        Table with ``head`` (column titles) and ``rows`` (lists of text): rows error and core-seconds; None if the
         recommendation was not run.
     """
     chosen = accuracy.recommended

@@ -87,7 +87,10 @@ def component_view(layout: Layout, component: Component, turns: int = 0) -> Layo
     Args:
         layout: Board in its own frame.
         component: Component whose centre becomes the origin.
-        turns: Counterclockwise quarter turns of the board.
+        turns: Counterclockwise quarter turns of the board, 0 to 3.
+
+    Returns:
+        Board whose positions are relative to the component.
     """
     origin, flip = component.centre, -1.0 if component.side == "bottom" else 1.0
     c, s = ((1, 0), (0, 1), (-1, 0), (0, -1))[turns % 4]

@@ -32,6 +32,9 @@ MAX_ROWS = 40
 def read_layout(path: Path) -> Layout:
     """Read a board from a file, by its suffix, or from a folder of Gerber and drill files.
 
+    Returns:
+        Outline, thickness (None if not in the file), holes, and components with their pads, in SI units.
+
     Raises:
         EcadError: The format is unknown, the file is damaged, or a dimension is not positive.
     """

@@ -37,6 +37,9 @@ VIA = "ViaDrill"
 def read_gerber(path: Path) -> Layout:
     """Read a board from a folder with copper, outline and drill files.
 
+    Returns:
+        Outline, thickness (None if not in the file), holes, and components with their pads, in SI units.
+
     Raises:
         EcadError: A file is damaged, the outline is missing, or no pad has the X2 attribute ``.P`` (component, pin).
     """

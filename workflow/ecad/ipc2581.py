@@ -34,6 +34,9 @@ Element = ElementTree.Element
 def read_ipc2581(path: Path) -> Layout:
     """Read the first step of an IPC-2581 file.
 
+    Returns:
+        Outline, thickness (None if not in the file), holes, and components with their pads, in SI units.
+
     Raises:
         EcadError: The file is damaged, is not IPC-2581, declares entities, or has no outline.
     """

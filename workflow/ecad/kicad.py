@@ -44,6 +44,9 @@ BODIES = ("Fab", "CrtYd")  # layers that show the body of a component, in order 
 def read_kicad(path: Path) -> Layout:
     """Read a board from a KiCad file.
 
+    Returns:
+        Outline, thickness (None if not in the file), holes, and components with their pads, in SI units.
+
     Raises:
         EcadError: The file is damaged, is not a KiCad board, or has no outline.
     """

@@ -33,6 +33,9 @@ COLUMNS = ("kind", "reference", "pin", *LENGTHS)
 def read_table(path: Path) -> Layout:
     """Read a board from a CSV table.
 
+    Returns:
+        Outline, thickness (None if not in the file), holes, and components with their pads, in SI units.
+
     Raises:
         EcadError: A column is missing or has no unit, a line is of an unknown kind, or the outline is missing.
     """

@@ -23,7 +23,7 @@ FIELDS = (
 
 
 def show_registry(console: Console) -> None:
-    """Print the tables of all effects of the program, by stage: what they add, influence, switch, implementation."""
+    """Print a table of all effects of the program for each stage: term, number, influence, switch, implementation."""
     for stage in dict.fromkeys(effect.stage for effect in registry().values()):
         table = new_table(f"\nEffects of the {stage}", "effect", "", "description")
         for effect in registry().values():
@@ -67,5 +67,10 @@ def effects_table(case: Case, effects: Mapping[str, Any], of_what: str) -> Table
 
 
 def show_effects(case: Case, console: Console) -> None:
-    """Print the table of a case's effects: on or off, expected influence, share of the predicted cost, why."""
+    """Print the table of a case's effects: on or off, expected influence, share of the predicted cost, why.
+
+    Args:
+        case: Case, from which effects and cost are predicted.
+        console: Console to print to.
+    """
     console.print(effects_table(case, dict(kind_of(case).forecast(case).effects), case.case.name))

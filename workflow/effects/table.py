@@ -23,7 +23,7 @@ MEASURED = Path(__file__).with_name("costs.json")  # written by benchmarks/effec
 
 @cache
 def read_measured_ratios() -> dict[str, float]:
-    """Return, by effect name, the measured processor time per step with the effect over the one without it."""
+    """Return, by effect name, the processor time per step with the effect over that without it, as benchmarks found."""
     return {name: item["ratio"] for name, item in json.loads(MEASURED.read_text(encoding="utf-8"))["effects"].items()}
 
 
@@ -84,7 +84,8 @@ def rows(case: Case, effects: Mapping[str, Any]) -> Iterator[tuple[str, bool, st
         effects: Name of an effect -> its decision: ``on``, ``why`` and, if predicted, ``influence``.
 
     Yields:
-        Name, whether it is on, influence, cost and reason; "–" without a prediction.
+        Name, whether it is on, influence, cost and reason; "–" without a prediction, costs of inactive effects in
+        parentheses.
     """
     shares = cost_shares(case, effects)
     for name, decision in effects.items():

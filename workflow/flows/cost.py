@@ -69,7 +69,7 @@ def plane_costs(scene: FlowScene, steps: int, shear_factor: float) -> dict[str, 
         shear_factor: `SHEAR_COST` if the viscosity depends on the shear rate, else 1.
 
     Returns:
-        Device -> its predicted cost.
+        Device -> number of steps and wall times from which its cost follows.
     """
     factor = scene.numerics.relative_cost
     each = SECONDS_PER_PARTICLE * shear_factor * factor
@@ -81,10 +81,15 @@ def plane_costs(scene: FlowScene, steps: int, shear_factor: float) -> dict[str, 
 
 
 def surface_costs(scene: Sized, steps: int, shear_factor: float) -> dict[str, Cost]:
-    """Return the cost of a flow in space with a triangulated surface; arguments as in `plane_costs`.
+    """Return the cost of a flow in space with a triangulated surface on the devices of its method.
+
+    Args:
+        scene: Scene with its particles.
+        steps: Number of time steps.
+        shear_factor: `SHEAR_COST` if the viscosity depends on the shear rate, else 1.
 
     Returns:
-        Device -> its predicted cost.
+        Device, "cpu" (one core) or "cuda" -> number of steps and wall times from which its cost follows.
     """
     each = SECONDS_PER_PARTICLE_IN_SPACE * shear_factor
     return {

@@ -107,7 +107,7 @@ def flow_pipeline(scene: str, *products: str) -> Pipeline:
 
     Args:
         scene: Table of the case file on which the stage depends.
-        products: Files of the stage in addition to ``flow.h5`` and ``particles.vtu``.
+        products: Files of the stage in addition to ``flow.h5`` and ``particles.vtu``; none by default.
     """
     files = ("flow.h5", "particles.vtu", *products)
     particles = Stage(STAGE, (scene,), (), tuple(f"{STAGE}/{name}" for name in files))

@@ -44,7 +44,15 @@ class FlowForecast:
 
 
 def forecast_flow(flow: FlowKind, case: FlowCase) -> FlowForecast:
-    """Predict effects, size, time step and cost of a flow, without running it."""
+    """Predict effects, size, time step and cost of a flow, without running it.
+
+    Args:
+        flow: Kind of flow, which gives the cost of a step.
+        case: Case of this kind.
+
+    Returns:
+        Effects, number and spacing of the particles, time step, number of steps, wall time by stage and device [s].
+    """
     scene: FlowScene = case.scene
     effects = decide_flow(scene)
     step = scene.expected_time_step(effects["flow_viscosity"]["on"])
@@ -58,6 +66,10 @@ def forecast_flow(flow: FlowKind, case: FlowCase) -> FlowForecast:
 def flow_size(flow: FlowKind, case: FlowCase) -> Size:
     """Predict wall times and memory of the stages of a case.
 
+    Args:
+        flow: Kind of flow.
+        case: Case of this kind.
+
     Returns:
         Seconds by stage, number of joints (1), and memory [B].
     """
@@ -66,7 +78,13 @@ def flow_size(flow: FlowKind, case: FlowCase) -> Size:
 
 
 def flow_tables(flow: FlowKind, case: FlowCase, forecast: FlowForecast) -> Iterator[RenderableType]:
-    """Yield the table of particles, speeds, time steps and cost."""
+    """Yield the table of particles, Reynolds number, speeds, time step and cost that ``plan`` prints.
+
+    Args:
+        flow: Kind of flow, with its unit of length and further rows.
+        case: Case of this kind.
+        forecast: Forecast of the case.
+    """
     scene: FlowScene = case.scene
     length, spacing = (from_si(size, flow.length_unit, digits=3) for size in (scene.length, forecast.spacing))
     rows: list[Row] = [

@@ -16,10 +16,10 @@ def run_flow(flow: FlowKind, run: Run[Any], folder: Path) -> Findings:
     Args:
         flow: Kind of flow.
         run: Run with its case.
-        folder: Folder of the products.
+        folder: Folder into which ``flow.h5``, ``particles.vtu`` and further products are written.
 
     Returns:
-        Metrics, health checks and effects.
+        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
     """
     from reflowshock.particles.core.checkpoint import Checkpoint
     from reflowshock.particles.scenes.products import write_flow

@@ -99,7 +99,7 @@ class _Task:
 
 
 def job_name(point: Point, stage: str) -> str:
-    """Return the name of the job that makes the product of a stage: ``<stage>-<key>``."""
+    """Return the name of the job that makes the product of a stage: ``<stage>-<key>`` with the point's key."""
     return f"{stage}-{point.digests[stage]}"
 
 

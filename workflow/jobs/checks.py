@@ -35,7 +35,7 @@ class Partition:
 
 
 def partitions() -> list[Partition]:
-    """Return the partitions of the cluster.
+    """Return the partitions of the cluster: name, total cores, cores of the largest node, whether it is the default.
 
     Raises:
         NoAnswer: Slurm cannot be reached.

@@ -110,7 +110,7 @@ def failures_of(log: Path) -> dict[str, str]:
         log: File with the output of Snakemake.
 
     Returns:
-        Message by name of the job.
+        Name of the job, ``<stage>-<key>`` -> message; empty without failures.
     """
     text = log.read_text(encoding="utf-8", errors="replace") if log.is_file() else ""
     reasons = {}

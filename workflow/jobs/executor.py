@@ -178,6 +178,9 @@ def executor_for(
         oversubscribe: Whether MPI may have more ranks than cores.
         cases: Cases to run.
 
+    Returns:
+        Executor of this machine (processes) or of the cluster (Slurm jobs).
+
     Raises:
         CaseError: Jobs cannot be submitted here, or a case is too large for the cluster.
     """

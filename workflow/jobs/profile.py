@@ -42,6 +42,9 @@ def read_profile(folder: Path | None) -> Profile:
     Args:
         folder: Folder of the profile; None for the user's ``profiles/slurm`` or, if missing, the shipped one.
 
+    Returns:
+        Partition of the jobs, launcher of MPI ranks, and factor on the requested wall time.
+
     Raises:
         CaseError: The file is missing or unreadable, or a value is invalid.
     """

@@ -94,7 +94,10 @@ BOARD_DROP = package_pipeline(heated=False, dropped=True)
 
 
 def joint_geometries(pads: "Sequence[PadSite]") -> "dict[str, JointGeometry]":
-    """Return the geometry (gap, radii, offset, tilt) of each joint of a pad table, by joint name."""
+    """Return the geometry (gap, radii, offset, tilt) of each joint of a pad table, by joint name.
+
+    Lengths are in metres, angles in radians; radii are those that solder can wet.
+    """
     from reflowshock.particles.core.geometry import JointGeometry
 
     return {

@@ -169,7 +169,7 @@ def of_solder_mesh(qualities: Mapping[str, Records], effects: Mapping[str, Any])
 
 
 def of_shock(results: Mapping[str, dict], folder: Path, thickness: float) -> Findings:
-    """Return metrics and checks of the shock, and of two-scale against DNS if both were run.
+    """Return metrics and checks of the shock, and of two-scale against DNS (one fine model) if both were run.
 
     Args:
         results: Mode -> content of its ``result.json`` (``model``, ``metrics``, ``health``, ``timings``, ``coupling``),
@@ -220,7 +220,7 @@ def _coupling_metrics(result: Mapping[str, Any]) -> dict:
 
 
 def ideal_ratio(coupling: Mapping[str, Any], dns: Mapping[str, Any]) -> float | None:
-    """Return the ideal time ratio two-scale / DNS: equal cost of all element updates, no overhead.
+    """Return the ideal time ratio two-scale / DNS (one model with all joints fine): equal cost of updates, no overhead.
 
     Args:
         coupling: Entry ``coupling`` of the two-scale ``result.json``; without ``levels`` the result is None.

@@ -84,6 +84,9 @@ def problems(reference: "Reference | None", kind: type[Case]) -> Iterator[Proble
     Args:
         reference: Reference of a case; None without one.
         kind: Model of the case, which the case of the reference must have, too.
+
+    Yields:
+        One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
     """
     if reference is not None and (why := _unusable(Path(reference.run), kind)):
         yield Problem(KEY, why, reference.run, ALLOWED)

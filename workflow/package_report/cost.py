@@ -65,7 +65,9 @@ def ranks(result: Record) -> str:
 
 
 def steps(result: Record) -> str:
-    """Return the time step of a DNS, or of all levels of a two-scale run, the window first, as text.
+    """Return the time step of a DNS (one model), or of all levels of a two-scale run, the window first, as text.
+
+    A window is the time between two exchanges of both models.
 
     Args:
         result: Content of ``result.json`` of a mode, with ``model`` (``mode``, ``step``, ``window`` [s]) and
@@ -82,7 +84,8 @@ def counts(model: Record) -> str:
     """Return the number of steps of a DNS, or of the macro model and the finest level of a two-scale run, as text.
 
     Args:
-        model: Entry ``model`` of a ``result.json``, with ``mode``, ``windows`` and ``substeps`` (steps in each window).
+        model: Entry ``model`` of a ``result.json``, with ``mode``, ``windows`` (times between two exchanges) and
+            ``substeps`` (steps in each).
     """
     every = number(model["windows"] * model["substeps"])
     return every if model["mode"] == "dns" else f"{number(model['windows'])}, {every}"
@@ -99,7 +102,7 @@ def memory(result: Record) -> str:
 
 
 def table(results: Mapping[str, dict], metrics: Record) -> dict | None:
-    """Return the cost table of both modes and the published ones; None unless both modes were run.
+    """Return the cost table of DNS (one model), two-scale run and the published ones; None unless both modes were run.
 
     Args:
         results: Mode -> content of its ``result.json`` (``model``, ``metrics``, ``health``, ``timings``, ``coupling``).

@@ -53,7 +53,10 @@ def by_shape(joints: Sequence[Record]) -> list[tuple[list[str], list[Record]]]:
     """Return names and records of the joints of each distinct shape, by increasing standoff of the first joint.
 
     Args:
-        joints: Records of the joints, see ``joint_records``.
+        joints: Records of ``joint_records``; joints with equal ``shape`` are one group.
+
+    Returns:
+        Names and records of each group.
     """
     groups: dict[str, list[Record]] = {}
     for joint in joints:

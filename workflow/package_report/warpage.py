@@ -153,7 +153,8 @@ def load_steps(structure: Mapping[str, NDArray]) -> dict:
             ``pad_motion``, …).
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per load step.
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per load step; quantities
+        that are zero throughout have no column.
     """
     columns = [
         ("temperature [°C]", structure["temperature"] - KELVIN, ".1f"),

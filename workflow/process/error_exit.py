@@ -178,7 +178,11 @@ def run_app(app: Callable[..., Any]) -> None:
 
 
 def report_error(error: BaseException) -> int:
-    """Print an error in one line on standard error, write its traceback to a file, and return the exit code."""
+    """Print an error in one line on standard error, write its traceback to a file, and return the exit code.
+
+    Errors of the input have a line for each problem, the exit code 2 and no traceback. An interrupt and all other
+    errors have the exit code 1, unless the error has an ``exit_code``. A closed pipe is not reported.
+    """
     if is_interrupt(error):
         _print_error("interrupted")
         return FAILED

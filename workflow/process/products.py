@@ -5,7 +5,7 @@ from pathlib import Path
 
 
 def read_json(path: Path) -> dict:
-    """Return the content of a JSON product whose outermost value is a table."""
+    """Return the content of a JSON product whose outermost value is a table, key -> value."""
     return json.loads(path.read_text(encoding="utf-8"))
 
 

@@ -84,7 +84,7 @@ errors = Terminal(2)
 
 
 def print_error(text: str) -> None:
-    """Print an error, its first line emphasised."""
+    """Print an error on standard error, its first line after "error:"; further lines follow unchanged."""
     first, _, rest = text.partition("\n")
     errors.print(style_text("[bold red]error:[/] {}", first), soft_wrap=True)
     if rest:

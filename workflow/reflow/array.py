@@ -56,7 +56,7 @@ class CarriedReflow:
 
 
 def records() -> tuple[type, ...]:
-    """Return the types that the files of jobs and results of this module's functions may contain."""
+    """Return the dataclasses that the files of jobs and results of this module's functions may contain, for reading."""
     from reflowshock.particles.core.geometry import JointGeometry
     from reflowshock.particles.scenes.carried_joint import Carried
     from reflowshock.particles.steps.shape import JointShape, Snapshot
@@ -130,7 +130,7 @@ def carry(job: CarriedReflow, progress: Callable[[float], None]) -> "Carried":
         progress: Function that is called with the fraction done, 0 to 1.
 
     Returns:
-        State and wrenches of the joint at rest.
+        Wrenches on the pads of board and package, shape (2, 6) [N, N m], and number of steps.
     """
     from reflowshock.particles.scenes.carried_joint import carry_joint
 

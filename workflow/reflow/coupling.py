@@ -228,6 +228,9 @@ def scale_of(geometries: "Sequence[JointGeometry]", solder: Solder, modes: "Rigi
         solder: Solder of one joint.
         modes: Free rigid motions of the package.
         tolerance: Tolerance of the relative residuals.
+
+    Returns:
+        Scale of each component of the wrenches, shape (joints, 2, 6), and of each rigid motion, shape (k,) [N, N m].
     """
     radii = np.array([(geometry.radius_board, geometry.radius_package) for geometry in geometries])
     force = np.pi * radii * solder.surface_tension
@@ -243,7 +246,7 @@ def start(geometries: "Sequence[JointGeometry]", solder: Solder, modes: "RigidMo
     Args:
         geometries: Geometries of the joints between the pads of the structure without solder.
         solder: Solder of one joint.
-        modes: Free rigid motions of the package.
+        modes: Free rigid motions of the package, with the force of gravity along each.
     """
     from reflowshock.particles.scenes.carried_joint import stiffness_estimate
 

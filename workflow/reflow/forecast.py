@@ -63,7 +63,11 @@ class HeatedForecast:
 
 
 def forecast_heated(case: "PackageCase", thermal: Thermal) -> HeatedForecast:
-    """Predict load steps, effects, and number of exchanges between solder and structure of a coupled reflow."""
+    """Predict load steps, effects, and number of exchanges between solder and structure of a coupled reflow.
+
+    Returns:
+        Decision on each effect, load steps with liquid solder, and total number of exchanges.
+    """
     steps = load_steps(thermal)
     effects = thermal_effects(case, thermal, [step.temperature for step in steps])
     each = EXCHANGES_TO_BEND if effects["solder_force"]["on"] else EXCHANGES_ONE_WAY

@@ -235,6 +235,9 @@ def final_exchanges(coupled: Coupled) -> list[Exchange]:
 
     Args:
         coupled: State of the coupling with all its exchanges.
+
+    Returns:
+        One exchange per load step, in order.
     """
     return list({exchange.load_step: exchange for exchange in coupled.exchanges}.values())
 

@@ -31,7 +31,7 @@ class JointReflow:
 
 
 def records() -> tuple[type, ...]:
-    """Return the types that the files of jobs and results of this module's functions may contain."""
+    """Return the dataclasses that the files of jobs and results of this module's functions may contain, for reading."""
     from reflowshock.particles.core.geometry import JointGeometry
     from reflowshock.particles.steps.shape import JointShape, Snapshot
 
@@ -180,6 +180,9 @@ def refuse_joints_without_mesh(records: Mapping[str, dict], verdicts: Sequence[s
     Args:
         records: Record by joint name, see ``joint_records``.
         verdicts: Verdicts of joints that cannot be meshed.
+
+    Raises:
+        ReflowError: A joint has such a verdict; the message names it.
     """
     for verdict in verdicts:
         names = [name for name, record in records.items() if record["verdict"] == verdict]

@@ -51,7 +51,7 @@ def name_of(work: Callable) -> str:
 
 
 def function_of(name: str) -> Callable:
-    """Import the module-level function with a name from ``name_of``."""
+    """Import and return the module-level function with a name "module:function", as from ``name_of``."""
     module, _, function = name.partition(":")
     imported: Callable = getattr(import_module(module), function)
     return imported
@@ -103,7 +103,7 @@ def main(folder: Path, work: Callable) -> int:
         work: Module-level function of the job and of a reporter of the fraction done, which returns the result.
 
     Returns:
-        Exit code: 1 if a job failed, else 0.
+        Exit code of the process: 1 if a job failed, else 0.
     """
     for path in filter(claim, sorted(folder.glob(f"*{JOB}"))):
         result = run_job(path, work)

@@ -25,7 +25,7 @@ def body_group(
 
     Args:
         name: Name of the group.
-        series: Cells, displacements and parts (``fields["part"]``) of the run.
+        series: Cells, displacements at k times and parts (``fields["part"]``) of the run.
         chosen: Mask of the selected cells, shape (c,).
         values: Cell values of each field, shape (k, c); a vertex gets the mean over its faces.
         style: Further attributes of ``Group``, such as ``colour``.

@@ -56,7 +56,7 @@ def history_curves(histories: Histories, critical_joint: str) -> list[Chart]:
 
 
 def difference_curves(histories: Histories, critical_joint: str) -> list[Chart]:
-    """Return charts of two-scale minus DNS, die displacement and critical stress; empty unless both were run.
+    """Return charts of two-scale minus DNS (one model), die displacement and critical stress; empty unless both ran.
 
     Args:
         histories: Mode -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity.

@@ -71,7 +71,7 @@ def headline(metrics: dict) -> list[dict]:
 
 
 def figures_of(names: Sequence[str], metrics: dict, text: Text) -> list[dict]:
-    """Return the named metrics that the run has, as records with ``label`` and ``value`` as text.
+    """Return the named metrics that the run has, as records with ``label`` and ``value`` as text; others are skipped.
 
     Args:
         names: Names of metrics, in the order of the result.
@@ -131,7 +131,7 @@ def versions() -> dict:
 
 
 def comparison(metrics: dict) -> dict | None:
-    """Return the table of two-scale against DNS; None unless both were run.
+    """Return the table of the two-scale run against the DNS (one model on one mesh); None unless both were run.
 
     Args:
         metrics: Name -> record with ``value`` (SI) and ``unit``.

@@ -55,7 +55,7 @@ def two_scales(coupling: Record, model: Record, found_by: str = "") -> dict:
 
 
 def levels(coupling: Record) -> dict | None:
-    """Return the table of step levels, level 0 being the window; None without levels.
+    """Return the table of step levels; level 0 has the window, the time between exchanges; None without levels.
 
     Args:
         coupling: Entry ``coupling`` of a ``result.json``; ``levels`` lists ``step`` [s], ``elements``, ``cost_share``.

@@ -50,7 +50,11 @@ class SolderForecast:
 
 
 def forecast_solder(case: Case) -> SolderForecast:
-    """Predict effects, size, time step and cost of a scene of solder alone (drop, joint, drops), without running it."""
+    """Predict effects, size, time step and cost of a scene of solder alone (drop, joint, drops), without running it.
+
+    Returns:
+        Effects, number and spacing of the particles, scheme and its reason, time steps, wall time by stage [s].
+    """
     return FORECASTS[case.kind](case)
 
 
@@ -164,7 +168,7 @@ def solder_size(case: Case) -> Size:
 
 
 def solder_tables(_case: Case, forecast: SolderForecast) -> Iterator[RenderableType]:
-    """Yield the table of particles, scheme and time steps, and the assumption behind the predicted cost."""
+    """Yield the table of particles, scheme and time steps that ``plan`` prints, and a line on the assumed speed."""
     table = new_table("\nReflow", "quantity", "value", "remark")
     table.add_row("particles", f"{forecast.particles}", f"{1e6 * forecast.spacing:.3g} µm initial spacing")
     table.add_row("scheme", forecast.scheme, SCHEMES[forecast.scheme] + (f"; {forecast.why}" if forecast.why else ""))

@@ -47,7 +47,7 @@ def add_solder(run_folder: Path, case: SolderCase, context: dict, summary: dict)
 
 
 def add_oscillation(run_folder: Path, _case: OscillationCase, context: dict, summary: dict) -> None:
-    """Add the section of an oscillating drop to the context of the report; arguments as in `add_solder`.
+    """Add the section of an oscillating drop to the context of the report.
 
     Args:
         run_folder: Run folder with the products.

@@ -23,7 +23,7 @@ class Change:
 
 
 def stage_inputs(case: Case, stage: Stage) -> dict:
-    """Return the inputs that a stage depends on: dotted key -> SI value, and ``<key>.sha256`` -> digest of a file."""
+    """Return the inputs of a stage: dotted key -> SI value, and for input files ``<key>.sha256`` -> digest."""
     contents = [(f"{key}.sha256", _digest(path)) for key, path in case.files.items()]
     return {key: value for key, value in [*_flat(case.model_dump(mode="json")), *contents] if stage.depends_on(key)}
 

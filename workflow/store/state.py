@@ -36,7 +36,7 @@ def examine(store: Store, point: Point) -> dict[str, StageState]:
     An intact product stays valid when an upstream product is rebuilt with the same content.
 
     Returns:
-        Name of a stage -> whether it has to run, and why.
+        Name of a stage -> whether it has to run, and why: missing, damaged files, changed parameters, upstream stages.
     """
     states: dict[str, StageState] = {}
     records = shown_records(store, point)

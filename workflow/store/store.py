@@ -148,7 +148,12 @@ def read_case_table(folder: Path) -> dict:
 
 
 def write_case(folder: Path, case: Case) -> None:
-    """Write the resolved case as JSON, with its digest, into a run folder unless the same file exists."""
+    """Write the resolved case as JSON, with its digest, into a run folder unless the same file exists.
+
+    Args:
+        folder: Run folder.
+        case: Resolved case, written in SI units.
+    """
     path, content = folder / CASE, case.model_dump(mode="json")
     text = json.dumps(content | {SEAL: digest_of(content)}, indent=1) + "\n"
     if path.is_file() and path.read_bytes() == text.encode():

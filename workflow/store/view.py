@@ -126,7 +126,7 @@ def altered_files(store: Store, folder: Path) -> list[str]:
 
 
 def remove_all_links(store: Store) -> None:
-    """Remove all files of the program from the folders of a store, and then empty folders."""
+    """Remove all files of the program from the run folders of a store, and then empty folders; products stay."""
     for folder in _folders(store):
         for name, link in list_program_files(store, folder).items():
             _remove_link(store, folder, name, link)

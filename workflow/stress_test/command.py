@@ -44,7 +44,7 @@ class Request:
 
 
 def stress_test(request: Request) -> bool:
-    """Run fixed and random hard cases and write the results.
+    """Run fixed and random hard cases, print their verdicts, and write pages and tables to the output folder.
 
     Args:
         request: Cases, families, number and seed of random cases, cores and output folder.

@@ -107,7 +107,7 @@ def two_scale_errors(differences: Mapping[str, float]) -> dict[str, float]:
 
 
 def cost_ratio(folders: Mapping[str, Path]) -> dict:
-    """Return the cost of the coupled run over the cost of the DNS, without start-up, as metrics.
+    """Return the cost of the coupled run over the cost of the DNS (one explicit model), without start-up, as metrics.
 
     Args:
         folders: Folders of the solvers "explicit" (the coupled run) and "dns", whose ``result.json`` is read.
@@ -179,7 +179,7 @@ def compare_with_references(case: StructureCase, motion: Motion) -> tuple[dict, 
 
     Args:
         case: Case of a structure.
-        motion: Natural modes, histories and positions of the watch points.
+        motion: Natural modes, histories (name -> array over time) and positions (x, y, z) [m] of the watch points.
 
     Returns:
         Metrics (``value``, ``unit``) by name, and health checks (``value``, ``limit``, ``ok``) by name.
@@ -236,7 +236,7 @@ def bars_of(case: StructureCase, reference: BarWave) -> exact_bar.Bars:
 
     Args:
         case: Case with two layers.
-        reference: Reference that names the load.
+        reference: Reference that names the half-sine pressure and the watch points.
     """
     from reflowshock.materials.elasticity import elasticity_matrix
 

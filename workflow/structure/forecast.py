@@ -63,7 +63,11 @@ class StructureForecast:
 
 
 def forecast_structure(case: StructureCase) -> StructureForecast:
-    """Predict sizes, time steps and cost of a run, without running it."""
+    """Predict sizes, time steps and cost of a run, without running it.
+
+    Returns:
+        Effects, size and critical step of each layer, time step and cost of each solver, wall time by stage [s].
+    """
     from reflowshock.fem.estimates.solver_cost import forecast_solvers
     from reflowshock.fem.estimates.structure_effects import effects
 
@@ -81,7 +85,7 @@ def forecast_structure(case: StructureCase) -> StructureForecast:
 
 
 def forecast_coupled(case: StructureCase, layers: Mapping[str, LayerForecast], update: float) -> CoupledForecast | None:
-    """Predict window and cost of a two-scale run, without buffers and step levels.
+    """Predict window (time between exchanges of both models) and cost of a two-scale run, without buffers and levels.
 
     Args:
         case: Case of a structure.
@@ -120,7 +124,7 @@ def critical_step(case: StructureCase, layers: Mapping[str, LayerForecast]) -> f
 
 
 def forecast_steps(case: StructureCase, layers: Mapping[str, LayerForecast]) -> dict[str, float]:
-    """Predict the time step [s] of each solver: "explicit", "dns" and "implicit".
+    """Predict the time step [s] of each solver: "explicit", "dns" (one model, explicit) and "implicit".
 
     Args:
         case: Case of a structure.
@@ -189,7 +193,7 @@ def shorter_than_window(case: StructureCase, window: float) -> Iterator[Problem]
 
 
 def forecast_layers(case: StructureCase) -> dict[str, LayerForecast]:
-    """Predict the number of elements and the critical time step of every layer, by its name."""
+    """Predict the number of elements and the critical time step [s] of every layer, by its name."""
     import numpy as np
 
     from reflowshock.fem.elements.box_step import box_element_step
@@ -237,13 +241,13 @@ def structure_size(case: StructureCase) -> Size:
 
 
 def structure_tables(case: StructureCase, outlook: StructureForecast) -> Iterator[RenderableType]:
-    """Yield the tables of layers and solvers that ``plan`` prints."""
+    """Yield the tables of ``plan``: elements and critical step of the layers; steps, cost and memory of the solvers."""
     yield layers_table(outlook)
     yield solvers_table(case, outlook)
 
 
 def layers_table(outlook: StructureForecast) -> Table:
-    """Return a table of elements and critical steps of the layers, top first."""
+    """Return a table with one row per layer, top first, and the total: elements, critical step and material."""
     table = new_table("\nLayers, top first", "layer", "elements", "critical step", "material")
     for name, layer in reversed(outlook.layers.items()):
         remark = "; mass scaled to the smallest step of the others" if layer.mass_scaled else ""
@@ -253,7 +257,10 @@ def layers_table(outlook: StructureForecast) -> Table:
 
 
 def solvers_table(case: StructureCase, outlook: StructureForecast) -> Table:
-    """Return a table of steps, cost and memory of both solvers, with a recommendation as its caption."""
+    """Return a table of step, number of steps, cost and memory: explicit, implicit and, if coupled, two models.
+
+    Its caption recommends a solver.
+    """
     table = new_table("\nSolvers, on one core", "solver", "step", "steps", "cost", "memory", "remark")
     numerics, forecast = case.dynamics.numerics, outlook.solvers
     is_prescribed = numerics.explicit_step is not None

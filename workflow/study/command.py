@@ -52,6 +52,9 @@ def read_points_of(path: Path, oversubscribe: bool = False, force: bool = False)
         oversubscribe: Whether MPI may have more ranks than cores.
         force: Whether implausible values are accepted.
 
+    Returns:
+        Study, points with a valid case, and the errors of the others, both by index.
+
     Raises:
         CaseError: The study is invalid, or has invalid points that it does not skip.
     """
@@ -165,6 +168,9 @@ def results(points: Points, store: Store, failed: dict[str, str]) -> list[Row]:
         points: Points of the study, possible and impossible ones.
         store: Store of the products.
         failed: Key of a point -> reason of its failure.
+
+    Returns:
+        Number, key, settings, verdict, message, wall time [s] and metrics of each point.
     """
     keys = points.study.design.keys
     rows = [row_of(index + 1, store, point, keys, failed.get(point.key)) for index, point in points.possible.items()]
@@ -176,7 +182,13 @@ def results(points: Points, store: Store, failed: dict[str, str]) -> list[Row]:
 
 
 def warn_of_metrics(points: Points, store: Store, first: Point) -> None:
-    """Print a warning of metrics of a study that the first complete point lacks, so that the user can stop early."""
+    """Print a warning of metrics of a study that the first complete point lacks, so that the user can stop early.
+
+    Args:
+        points: Points with their study, whose metrics are named in its file.
+        store: Store of the products.
+        first: The first complete point.
+    """
     show_products(store, first)
     row = row_of(1, store, first, points.study.design.keys, None)
     available = _metrics_of(points.study, [row])

@@ -157,6 +157,9 @@ def grid_axes(table: Mapping[str, object], problems: list[Problem]) -> Iterator[
     Args:
         table: Keys, joined by commas if they vary together -> list of values.
         problems: List to which errors are added.
+
+    Yields:
+        One factor (its keys) and the settings of each of its values.
     """
     for text, values in table.items():
         keys = _keys(text)
@@ -182,6 +185,9 @@ def list_axis(rows: Sequence[Mapping[str, object]], problems: list[Problem]) -> 
     Args:
         rows: Tables ``[[list]]``, each dotted key -> value.
         problems: List to which errors are added.
+
+    Returns:
+        Factors and, for each row, its settings (dotted key -> text).
     """
     points = tuple({key: as_text(value) for key, value in row.items()} for row in rows)
     for index, point in enumerate(points):
@@ -202,6 +208,9 @@ def sample_axis(table: Mapping[str, object], cube: Hypercube, problems: list[Pro
         table: Keys -> [low, high], as quantities or numbers.
         cube: Number of samples and seed of the Latin hypercube.
         problems: List to which errors are added.
+
+    Returns:
+        One continuous factor per line and, for each sample, its settings (dotted key -> text).
     """
     factors = [Factor(_keys(text), continuous=True) for text in table]
     ranges = []

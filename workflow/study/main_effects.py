@@ -72,7 +72,7 @@ class MainEffect:
 
 
 def select_measured(rows: Sequence[Row], metric: str) -> list[Row]:
-    """Return the rows in which a metric is a finite number, in their order."""
+    """Return the rows in which the metric with the name ``metric`` is a finite number, in their order."""
     return [row for row in rows if is_number(row.metrics.get(metric, {"value": None})["value"])]
 
 
@@ -111,7 +111,7 @@ def rank_parameters(rows: Sequence[Row], metric: str, goal: str) -> list[Row]:
     Args:
         rows: Results of the points.
         metric: Name of the metric.
-        goal: "minimise" or "maximise".
+        goal: "minimise" or "maximise"; rows with failed checks are left out.
     """
     from reflowshock.workflow.study.results import HEALTHY
 

@@ -96,7 +96,7 @@ def main_effects(effects: Sequence[tuple[str, str, Sequence[MainEffect]]]) -> Fi
 
 
 def axis_title(effect: MainEffect) -> str:
-    """Return the title of a factor's axis in two lines, with the unit of its values in the study."""
+    """Return the title of a factor's axis in two lines, table and key, with the unit of its values."""
     table, _, name = effect.factor.keys[0].rpartition(".")
     return f"{table}\n{name} [{spelled(effect.unit)}]" if effect.unit else f"{table}\n{name}"
 

@@ -19,7 +19,8 @@ def ranking(study: Study, rows: Sequence[Row]) -> dict:
         rows: Results of the points.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text).
+        Table with ``head`` (column titles) and ``rows`` (lists of text): rank, point, its
+        first keys, and the metrics of the study.
     """
     metrics = study.metrics
     keys = [factor.keys[0] for factor in study.design.factors]
@@ -62,7 +63,8 @@ def effect_table(effects: Sequence[tuple[str, str, Sequence[MainEffect]]]) -> di
         effects: Metric, its unit and its main effects, see ``effects``.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text).
+        Table with ``head`` (column titles) and ``rows`` (lists of text): factor, metric,
+        size of the effect, rank correlation and p-value.
     """
     return {
         "head": ["factor", "metric", "effect", "rank correlation", "p-value"],
@@ -81,7 +83,7 @@ def effect_table(effects: Sequence[tuple[str, str, Sequence[MainEffect]]]) -> di
 
 
 def imbalance(rows: Sequence[Row]) -> str:
-    """Return a warning if points without a result or with failed checks bias the means; empty otherwise.
+    """Return a warning if points without metrics or with failed checks bias the means of main effects; else empty.
 
     Args:
         rows: Results of the points.
@@ -98,7 +100,8 @@ def troubles(rows: Sequence[Row]) -> dict:
         rows: Results of the points.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text) and ``prose``.
+        Table with ``head`` (column titles) and ``rows`` (lists of text): settings, point,
+        result and reason; ``prose`` for wrapped text.
     """
     return {
         "head": ["settings", "point", "result", "reason"],

@@ -17,7 +17,7 @@ def answer(verdict: Record, error: float | None) -> str:
     """Return the verdict in one line, with the criterion that decides and its margin.
 
     Args:
-        verdict: Record of ``verdict_of``.
+        verdict: Record of ``verdict_of``, with ``criterion``, ``criteria``, ``joint``, ``joints`` and perhaps ``life``.
         error: Relative discretisation error of the value of the joint that is named; None if unknown.
     """
     joint = verdict["joints"][verdict["joint"]]
@@ -35,7 +35,8 @@ def judged_text(record: Record) -> str:
     """Format the value of a criterion with its limit, margin and short source.
 
     Args:
-        record: Record of a criterion that applies.
+        record: Record of a criterion that applies: ``name``, ``value`` (None: unlimited), ``limit``, ``unit``,
+            ``margin`` (or None) and, if it refers to one, ``joint``.
     """
     criterion = BY_NAME[record["name"]]
     label = f", {criterion.label}" if criterion.label else ""
@@ -50,7 +51,7 @@ def failing(verdict: Record) -> str:
     """Return a sentence on the joints that fail, the smallest margin first; empty if none fails.
 
     Args:
-        verdict: Record of ``verdict_of``.
+        verdict: Record of ``verdict_of``; of ``joints`` (name -> record), ``verdict`` and ``margin`` are read.
     """
     joints = verdict["joints"]
     failed = sorted((name for name in joints if joints[name]["verdict"] == FAIL), key=lambda k: joints[k]["margin"])
@@ -65,7 +66,8 @@ def against_limit(joint: Record) -> str:
     """Format the value of a joint with its limit and margin.
 
     Args:
-        joint: Record of a joint in ``verdict_of``; without a limit only the value is written.
+        joint: Record of a joint in ``verdict_of``: ``criterion``, ``value``, ``limit`` and ``margin``; only the value
+            is written if the limit is None.
     """
     words, unit = BY_NAME[joint["criterion"]].words, MEASURES[joint["criterion"]].unit
     value = " ".join(value_text(joint["value"], unit))
@@ -79,7 +81,8 @@ def in_drops(life: Record) -> str:
     """Format a life with its scatter band, or as unlimited.
 
     Args:
-        life: Record ``life`` of ``verdict_of``.
+        life: Record ``life`` of ``verdict_of``: ``joint``, ``measure``, ``drops`` (None: unlimited), ``least``,
+            ``most``.
     """
     if life["drops"] is None:
         return f"life unlimited, {life['measure'].replace('_', ' ')} is not positive"
@@ -88,7 +91,14 @@ def in_drops(life: Record) -> str:
 
 
 def criteria_table(verdict: Record) -> dict:
-    """Return the table of the criteria that apply, the smallest margin first, and ``note`` on the others."""
+    """Return the table of the criteria that apply, the smallest margin first, and a note on the others.
+
+    Args:
+        verdict: Record of ``verdict_of``; its ``criteria`` and, if present, ``life`` are read.
+
+    Returns:
+        ``head`` (column titles), ``rows`` (texts of value, limit, margin, verdict and source), ``prose`` and ``note``.
+    """
     applying = sorted(
         (r for r in verdict["criteria"] if r["applies"]), key=lambda r: (r["margin"] is None, r["margin"])
     )

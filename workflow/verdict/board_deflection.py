@@ -54,11 +54,11 @@ class Seat:
 
 
 def allowed_deflection(board: Board, seat: Seat, axis: int, constant: float) -> float:
-    """Return the peak deflection [m] that a component allows in a shock.
+    """Return the peak deflection [m] of the board that a component survives in a shock, by Steinberg's rule.
 
     Args:
-        board: Board.
-        seat: Component.
+        board: Board with its edges and thickness.
+        seat: Component with its sides [m] and its position factor.
         axis: Axis of the edge B and of the length L, 0 for x or 1 for y.
         constant: Constant C of the type of component.
     """
@@ -78,7 +78,11 @@ def position_factor(board: Board, at: tuple[float, float]) -> float | None:
 
 
 def deflection(history: Arrays) -> np.ndarray:
-    """Return the deflection of the board below the package since the start, relative to the table, shape (times,)."""
+    """Return the deflection of the board below the package since the start, without sign, shape (times,) [m].
+
+    Args:
+        history: Arrays of ``history.npz``; ``board_centre``, shape (times, 3) [m] relative to the drop table, is read.
+    """
     height = history["board_centre"][:, 2]
     return np.abs(height - height[0])
 
@@ -128,6 +132,9 @@ def seats(case: BoardDropCase) -> list[Seat]:
 
     Their factors r need the deflection of the board's centre, so they are compared only if the package is there, and
     only between the holes.
+
+    Returns:
+        Name, sides along x and y [m] and position factor of each component, the package first.
     """
     substrate, board = case.package.substrate, case.board
     judged = [Seat("the package", (substrate.length, substrate.width))]

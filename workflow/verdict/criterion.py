@@ -120,7 +120,7 @@ class Criterion(ABC):
 
 
 def worst(judgements: Iterable[Judgement]) -> Judgement | None:
-    """Return the judgement with the smallest margin among those that apply; None if none applies."""
+    """Return the judgement (value and limit) with the smallest margin of those that apply; None if none applies."""
     applying = [judgement for judgement in judgements if judgement.applies]
     return min(applying, key=lambda judgement: judgement.rank, default=None)
 
@@ -132,7 +132,7 @@ def value_text(value: float, unit: str) -> tuple[str, str]:
 
 
 def margin_text(margin: float) -> str:
-    """Return a margin with two digits."""
+    """Return a margin as text with two digits; it is a ratio to the limit, and below 1 the limit is violated."""
     return f"{margin:.2g}" if margin < 99.5 else f"{margin:.0f}"
 
 

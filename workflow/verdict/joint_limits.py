@@ -66,7 +66,16 @@ class DropLife(Criterion):
 
 
 def life_of(life: Life, history: Arrays) -> dict:
-    """Return the drops to failure of the joint that fails first by the law of life; None if no measure is positive."""
+    """Return the drops to failure of the joint that fails first by the law of life.
+
+    Args:
+        life: Law N = C s^-m of drops N by the measure s, with its scatter.
+        history: Arrays of ``history.npz``, in which the joint with the largest peak of the measure is found.
+
+    Returns:
+        ``joint``, ``measure`` (name), ``value`` (peak, SI), ``source``, and ``drops`` with the scatter band ``least``
+        and ``most``; these three are None if no peak is positive.
+    """
     measure = MEASURES[life.measure]
     peaks = measure.peaks(history)
     column = int(np.argmax(peaks))

@@ -15,16 +15,25 @@ Metrics = Mapping[str, Mapping[str, Any]]
 
 @dataclass(frozen=True, slots=True)
 class Ratio:
-    """Ratio of a metric to its value in a reference design; None with the reason why it is undefined."""
+    """Ratio of a metric to its value in a reference; None with the reason why it is undefined."""
 
     value: float | None
     why: str = ""
 
 
 def ratio_of(name: str, metrics: Metrics, reference: Metrics) -> Ratio:
-    """Return the ratio of a metric of ``RATIOS`` to its value in a reference design.
+    """Return the ratio of a metric of ``RATIOS`` to its value in a reference.
 
     Joint metrics belong to the critical joint of each design.
+
+    Args:
+        name: Key of ``RATIOS``.
+        metrics: Name -> record with ``value`` (SI) and ``unit``, of this run.
+        reference: The same of the reference design.
+
+    Returns:
+        Ratio; None with the reason if a run lacks the metric, its reference is not positive, or plastic work is
+        averaged over different layers.
     """
     for owner, values in (("this run", metrics), ("the reference", reference)):
         if name not in values:

@@ -40,7 +40,11 @@ def verdict_of(drop: JudgedDrop) -> dict[str, Any]:
 
 
 def verdict_of_structure() -> dict[str, Any]:
-    """Return the verdict on a structure, to which no criterion applies: it names no component that could fail."""
+    """Return the verdict on a structure, to which no criterion applies: it names no component that could fail.
+
+    Returns:
+        ``design`` "NO LIMIT", ``criterion`` None, ``criteria`` with the record that gives the reason, empty ``joints``.
+    """
     why = "a structure does not say which component it carries; only the packages of a board drop are judged"
     record = Judgement(BoardDeflection.name, unit="m", why=why).record
     return {"design": NO_LIMIT, "criterion": None, "criteria": [record], "joints": {}}
