@@ -50,7 +50,7 @@ def write_data(path: Path, header: Mapping[str, Any], value: object) -> None:
 
 
 def read_header(path: Path) -> dict[str, Any]:
-    """Return the header of a file without reading the rest.
+    """Return the header of a file of ``write_data``, the mapping that was given to it, without reading the rest.
 
     Raises:
         NotData: The file has no valid header.

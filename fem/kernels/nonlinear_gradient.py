@@ -109,8 +109,8 @@ def strain_increment(w, state, finite):
     Args:
         w: Flat workspace, entry k of element e at ``16 * k + e``; reads the displacement gradient (nine entries) at
             ``DEFORMATION``, which finite kinematics turn into F; writes the six strain increments at ``INCREMENT``.
-        state: Flat state of the point, shape (208,): six stresses, plastic strain, six strains or stretches per
-            element; the latter are updated.
+        state: Flat state of the point, entry k of element e at ``16 * k + e``, shape (208,): six stresses, plastic
+            strain, and six strains (small) or stretches of U (finite), which are updated; order xx, yy, zz, xy, yz, xz.
         finite: Whether rotations and strains are finite, a boolean.
 
     Returns:

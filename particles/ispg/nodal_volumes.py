@@ -103,8 +103,8 @@ def nodal_volumes(body: Body, density: Floats, moments: Moments) -> Floats:
 
     Args:
         body: Liquid body.
-        density: Particle density at each particle, with walls mirrored and the free surface counted by ``cell_share``,
-            shape (n,).
+        density: Number of particles per volume at each particle, with walls mirrored and the free surface counted by
+            ``cell_share``, shape (n,) [1/m^3].
         moments: Integrals over the body of 1 [m^3], x, shape (3,) [m^4], and x x, shape (3, 3) [m^5].
 
     Raises:

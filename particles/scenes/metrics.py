@@ -89,12 +89,12 @@ def body_metrics(solder: Solder, reference: Meridian | None, flow: LiquidFlow, r
 def with_shape_error(
     shape: JointShape, solder: Solder, reference: Meridian | None, surface: Body | None = None
 ) -> JointShape:
-    """Add the error of the free surface over the cube root of the volume, if the shape has a reference.
+    """Add the metric ``shape_error``: the RMS distance to the reference over the cube root of the volume.
 
     Args:
         shape: Shape at rest.
         solder: Solder with the volume of the shape.
-        reference: Exact meridian; None leaves the shape unchanged.
+        reference: Exact meridian; None leaves the shape unchanged, as do open and bridged joints.
         surface: Body on whose surface the error is measured; None for the surface of the shape.
     """
     if reference is None or shape.verdict in ("open", "bridged"):

@@ -63,7 +63,10 @@ def _sum_surface(points, normals, lists, kernel, sums):
 
 @njit(cache=True)
 def add_wall_friction(sums: Floats, fields: Fields, law: Law, rates: Floats) -> None:
-    """Subtract the missing friction of the wall z = 0 from the accelerations of particles in films.
+    """Subtract the friction of the wall z = 0 that mirrored particles do not resolve in thin films.
+
+    A film is a thin layer below a mostly level surface. Its friction after lubrication theory is 3 mu / H^2 times the
+    velocity; the share that the mirrored particles already give is not subtracted again.
 
     Args:
         sums: Kernel summed over all surface vertices, over level ones [1/m^3], and over level ones times their height

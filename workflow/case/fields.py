@@ -86,7 +86,10 @@ def alternatives(field: FieldInfo) -> tuple[FieldInfo, ...]:
 
 
 def allowed(field: FieldInfo) -> str:
-    """Describe the allowed values of a field as text: names, or a range in the user's unit; empty if unlimited."""
+    """Describe the allowed values of a field as text: names, or a range in the user's unit; empty without a limit.
+
+    A quantity without bounds gives ``any`` and its kind.
+    """
     kinds = alternatives(field)
     if len(kinds) > 1:
         return ", or ".join(", ".join(literal_names(kind)) or allowed(kind) or "a list of names" for kind in kinds)

@@ -92,7 +92,8 @@ def joint_records(
     Returns:
         Record by joint name, in the order of the geometries: ``shape``, the name of the first joint of its group;
         ``mirror`` and ``turn`` [rad], a reflection of y followed by a rotation about z, which give the joint from that
-        shape; ``place``, the position of the package's pad relative to the board's; ``verdict`` and ``metrics``.
+        shape; ``place``, the position of the package's pad relative to the board's: ``gap`` [m], ``offset`` [m] along
+        x and y, and ``tilt`` [rad] about them; ``verdict``, a word; ``metrics``, each with ``value`` and ``unit``.
     """
     from reflowshock.particles.scenes.products import remove_timings
 

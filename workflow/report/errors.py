@@ -52,11 +52,14 @@ def scheme_error(name: str, results: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def left_out(effects: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return the neglected effects with their expected influence, the largest first, as text.
+    """Return the neglected effects with an expected influence of at least 1 %, the largest first, as text.
 
     Args:
         effects: Name of an effect -> its decision: ``on``, ``why`` and, if predicted, ``influence`` (relative change of
             the result).
+
+    Returns:
+        Names with their influence in per cent, or a sentence that there are none.
     """
     influence = {name: item["influence"] for name, item in effects.items() if not item["on"] and "influence" in item}
     large = sorted(

@@ -305,11 +305,14 @@ def component_chart(histories: Histories, quantity: str, location: str, title: s
     """Return a chart of one component of a vector or tensor: the largest one in the first history.
 
     Args:
-        histories: Solver -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity; the
-            quantity has shape (k, 3) or (k, 6).
+        histories: Solver -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and ``quantity@location``, shape
+            (k, 3) or (k, 6).
         quantity: Key of ``UNITS``.
         location: Name of a watch point or support.
         title: Title of the chart.
+
+    Returns:
+        Chart of the component with the largest absolute value in the first history, one curve for each solver.
     """
     name = f"{quantity}@{location}"
     first = next(iter(histories.values()))[name]
