@@ -172,7 +172,7 @@ def test_bodies_that_cannot_rebuild():
     joint = Body.at_rest(joint_cloud(tilted, 0.07e-9, 0.8e-4))
     with pytest.raises(CannotRebuild, match="horizontal walls"):
         rebuild(joint, joint)
-    with pytest.raises(CannotRebuild, match="free, or on the same walls"):
+    with pytest.raises(CannotRebuild, match="only free bodies, or bodies on the same walls"):
         rebuild(sphere_body(0.2 * R), Body.at_rest(box_cloud(1e-3, 5)))
 
 
