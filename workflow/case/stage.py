@@ -1,10 +1,6 @@
 """Stages and pipelines of cases: parameters, inputs and products, from which jobs and stale products are derived."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    pass
 
 PAGE = ("report.html", "summary.json")
 
