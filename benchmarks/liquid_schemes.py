@@ -23,7 +23,7 @@ from benchmarks.tension.scenes import TRACKED, make_pair
 from reflowshock.particles.flows.droplet import Droplet, DropletNumerics
 from reflowshock.particles.parameters.effects import decide_drop, switched
 from reflowshock.particles.parameters.scenes import PROPERTIES, Drop, Drops, Fluid
-from reflowshock.particles.parameters.solder import FlowEffects, FlowNumerics
+from reflowshock.particles.parameters.solder import FlowEffects, SchemeNumerics
 from reflowshock.particles.scenes.drop_at_rest import drop_to_rest
 from reflowshock.particles.scenes.drop_pair import start_clouds
 from reflowshock.particles.scenes.flow_setup import start_flow
@@ -62,7 +62,7 @@ def ink(ohnesorge: float, across: int, **more) -> Droplet:
 
 def solder(ohnesorge: float) -> Fluid:
     """Return the liquid for ISPG."""
-    effects, numerics = FlowEffects(inertia="on"), FlowNumerics(scheme="ispg")
+    effects, numerics = FlowEffects(inertia="on"), SchemeNumerics(scheme="ispg")
     return Fluid(parameters="paper", viscosity=viscosity(ohnesorge), effects=effects, numerics=numerics)
 
 

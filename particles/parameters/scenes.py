@@ -13,8 +13,8 @@ from reflowshock.parameters import Parameters
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.solder import (
     FlowEffects,
-    FlowNumerics,
     Process,
+    SchemeNumerics,
     Solder,
     SolderEffects,
     SolderNumerics,
@@ -256,7 +256,7 @@ class Fluid(Liquid, Process):
     """
 
     effects: FlowEffects = FlowEffects()
-    numerics: FlowNumerics = FlowNumerics()
+    numerics: SchemeNumerics = SchemeNumerics()
 
     def resolve(self, scene: Scene, gravity: Switch) -> Solder:
         """Return the solder of a scene, with the properties of this liquid.

@@ -14,7 +14,7 @@ from reflowshock.particles.parameters.schemes import Scheme, SchemeOrAuto, Wall
 from reflowshock.quantity import Quantity
 
 
-class FlowNumerics(Parameters):
+class SchemeNumerics(Parameters):
     """Numerical parameters of a reflow, apart from the resolution.
 
     The scheme energy minimises the energy of the tracked surface at constant volume, and uses tetrahedra for inertia
@@ -33,7 +33,7 @@ class FlowNumerics(Parameters):
     max_steps: int | None = Field(None, ge=1)
 
 
-class SolderNumerics(FlowNumerics):
+class SolderNumerics(SchemeNumerics):
     """Numerical parameters of a reflow with a resolved scheme."""
 
     scheme: Scheme = "energy"

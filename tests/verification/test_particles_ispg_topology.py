@@ -6,7 +6,7 @@ import pytest
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.effects import decide_drop, switched
 from reflowshock.particles.parameters.scenes import Drop, Drops, Fluid
-from reflowshock.particles.parameters.solder import FlowEffects, FlowNumerics
+from reflowshock.particles.parameters.solder import FlowEffects, SchemeNumerics
 from reflowshock.particles.reference.young_laplace import pad_meridian
 from reflowshock.particles.scenes.drop_at_rest import drop_to_rest
 from reflowshock.particles.scenes.drop_pair import pair_to_rest, start_clouds
@@ -21,7 +21,7 @@ BALL = 4.0 / 3.0 * np.pi * RADIUS**3
 
 def fluid(parameters):
     """Return a liquid with inertia for the scheme ispg."""
-    return Fluid(parameters=parameters, effects=FlowEffects(inertia="on"), numerics=FlowNumerics(scheme="ispg"))
+    return Fluid(parameters=parameters, effects=FlowEffects(inertia="on"), numerics=SchemeNumerics(scheme="ispg"))
 
 
 def named(shape):

@@ -14,7 +14,7 @@ from reflowshock.particles.ispg.ispg_step import IspgStep
 from reflowshock.particles.ispg.nodal_volumes import body_moments
 from reflowshock.particles.parameters.effects import decide_drop, switched
 from reflowshock.particles.parameters.scenes import Drop, Fluid
-from reflowshock.particles.parameters.solder import FlowEffects, FlowNumerics
+from reflowshock.particles.parameters.solder import FlowEffects, SchemeNumerics
 from reflowshock.particles.physics.forces import SurfaceTension
 from reflowshock.particles.physics.operators import Inertia, Mass
 from reflowshock.particles.physics.physics import Physics
@@ -177,7 +177,7 @@ def test_contact_lines_change_only_where_they_may(change):
 def test_a_cube_that_becomes_a_film_keeps_enough_neighbours():
     """With 5 per edge at 30 degrees and no new particles the run failed in step 32 with too few neighbours."""
     drop = Drop(volume=1e-9, contact_angle=np.radians(30.0), particles_per_edge=5)
-    fluid = Fluid(parameters="paper", effects=FlowEffects(inertia="on"), numerics=FlowNumerics(scheme="ispg"))
+    fluid = Fluid(parameters="paper", effects=FlowEffects(inertia="on"), numerics=SchemeNumerics(scheme="ispg"))
     solder = fluid.resolve(drop, "off")
     cloud = box_cloud(drop.edge, drop.count)
     lines = (contact_line(cloud, 0, drop.edge_radius, solder),)
