@@ -32,7 +32,7 @@ class Barrel(Parameters):
     void: Length | None = Field(None, gt=0)
 
     def surface(self) -> "ClosedSurface":
-        """The closed surface."""
+        """Return the closed surface."""
         from reflowshock.cases.hard.trials.surfaces import barrel, with_void
 
         whole = barrel(self.gap, self.bulge, self.lower, self.upper)
@@ -48,7 +48,7 @@ class Overflow(Parameters):
     reach: Length = Field(3.0e-4, gt=0)
 
     def surface(self) -> "ClosedSurface":
-        """The closed surface."""
+        """Return the closed surface."""
         from reflowshock.cases.hard.trials.surfaces import overflow
 
         return overflow(self.gap, self.angle, self.reach)
@@ -64,7 +64,7 @@ class Lobed(Parameters):
     depth: float = Field(gt=0, lt=1)
 
     def surface(self) -> "ClosedSurface":
-        """The closed surface."""
+        """Return the closed surface."""
         from reflowshock.cases.hard.trials.surfaces import lobed
 
         return lobed(self.gap, self.radius, self.lobes, self.depth)
@@ -78,7 +78,7 @@ class Hooked(Parameters):
     reach: Length = Field(gt=0)
 
     def surface(self) -> "ClosedSurface":
-        """The closed surface."""
+        """Return the closed surface."""
         from reflowshock.cases.hard.trials.surfaces import hooked
 
         return hooked(self.gap, self.reach)
@@ -93,7 +93,7 @@ class Bridged(Parameters):
     bridge: Length = Field(gt=0)
 
     def surface(self) -> "ClosedSurface":
-        """The closed surface."""
+        """Return the closed surface."""
         from reflowshock.cases.hard.trials.joints import PAIR
         from reflowshock.cases.hard.trials.surfaces import bridged_pair
 
