@@ -60,8 +60,8 @@ class Coupling(Parameters):
     Where no buffer fits, ``auto`` takes ``gravouil_combescure``, which needs none. ``impulse`` has the buffer of held
     velocity and conserves momentum exactly, but its models wait for each other. With ``one_way`` the macro model drives
     the meso model without feedback. ``levels`` is the number of step levels of the meso model below the window; held
-    velocity allows at most three, and only one with damping, springs, cooling stress or a large mass on nodes of the
-    meso model. ``buffer_layers`` is the number of layers of board elements between the joints and an interface of held
+    velocity allows at most three, and only one with stiffness damping, springs, cooling stress or a large mass on nodes
+    of the meso model. ``buffer_layers`` is the number of layers of board elements between the joints and an interface of held
     velocity; ``path_levels`` defines the buffers between levels.
     """
 

@@ -14,7 +14,6 @@ def problems(shock: Shock) -> list[Problem]:
         *_pulse(shock),
         *_beyond_the_end(shock),
         *_damping(shock.damping),
-        *_large_mass(shock),
         *_finite(shock),
         *_coupling(shock.coupling),
         *_filter(shock),
@@ -64,16 +63,6 @@ def _beyond_the_end(shock: Shock) -> Iterator[Problem]:
         latest = max(times, default=0.0) if isinstance(times, tuple) else times or 0.0
         if latest > shock.duration:
             yield Problem(key, "is after the end of the shock", times, "<= shock.duration")
-
-
-def _large_mass(shock: Shock) -> Iterator[Problem]:
-    if shock.method == "large_mass" and shock.damping.coefficients[0]:
-        yield Problem(
-            "shock.method",
-            "cannot be combined with mass-proportional damping, which would slow the moving table",
-            shock.method,
-            "direct, or stiffness-proportional damping",
-        )
 
 
 def _finite(shock: Shock) -> Iterator[Problem]:

@@ -65,7 +65,6 @@ PROBLEMS = {
         "damping": Damping(stiffness_coefficient=1e-9),
         "numerics": {"kinematics": "finite"},
     },
-    "shock.method": {"method": "large_mass", "damping": Damping(mass_coefficient=10.0)},
 }
 
 
