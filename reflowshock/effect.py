@@ -13,18 +13,24 @@ GIVEN = "none: the case says it"
 
 
 class Decision(TypedDict):
-    """Decision on an effect: state, reason and, if predicted, its expected relative influence on the result."""
+    """Decision on an effect: state, reason and, if predicted, its expected relative influence on the result.
+
+    Damping has its ratio of critical damping, too.
+    """
 
     on: bool
     why: str
     influence: NotRequired[float]
+    ratio: NotRequired[float]
 
 
-def decision(on: bool, why: str, influence: float | None = None) -> Decision:
+def decision(on: bool, why: str, influence: float | None = None, ratio: float | None = None) -> Decision:
     """Return a decision as a plain dictionary for plans and results."""
     result: Decision = {"on": bool(on), "why": why}
     if influence is not None:
         result["influence"] = float(influence)
+    if ratio is not None:
+        result["ratio"] = float(ratio)
     return result
 
 

@@ -112,6 +112,28 @@ class Damping(Parameters):
         return self.mass_coefficient + by_mass, self.stiffness_coefficient + 2.0 * self.stiffness_ratio / angular
 
 
+class BoardDamping(Damping):
+    """Damping of a dropped board; ``estimate = auto`` or ``on`` estimates it from the first natural frequency.
+
+    The estimate is a ratio of critical damping 1 / (2 sqrt(f1 / Hz)) of the first mode, proportional to the mass, so
+    that the time step is unchanged. ``auto`` takes the damping that a case gives and estimates it otherwise; ``off``
+    leaves the board undamped unless the case gives damping.
+    """
+
+    estimate: Switch = "auto"
+
+    @property
+    def is_given(self) -> bool:
+        """Whether there are coefficients or ratios."""
+        terms = self.mass_coefficient, self.stiffness_coefficient, self.mass_ratio, self.stiffness_ratio
+        return any(terms)
+
+    @property
+    def acts(self) -> bool:
+        """Whether a drop is damped: the case gives the damping, or it is estimated."""
+        return self.is_given or self.estimate != "off"
+
+
 class ShockNumerics(Parameters):
     """Numerical parameters of the shock.
 
@@ -190,7 +212,7 @@ class Shock(Parameters):
     modes: int = Field(0, ge=0, le=200)
     method: Literal["direct", "large_mass"] = "direct"
     gravity: Literal["auto", "on", "off"] = "auto"
-    damping: Damping = Damping()
+    damping: BoardDamping = BoardDamping()
     filter: LowPass = LowPass()
     failure: Failure = Failure()
     ranks: Ranks = Ranks()

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from reflowshock.fem.problem.attachment_checks import filter_problems
 from reflowshock.fem.problem.kinematics import TURNING
-from reflowshock.fem.problem.shock import Damping, JointCoupling, Shock
+from reflowshock.fem.problem.shock import BoardDamping, JointCoupling, Shock
 from reflowshock.problem import Problem
 
 
@@ -40,7 +40,10 @@ def _pulse(shock: Shock) -> Iterator[Problem]:
         yield Problem(extra, message, definitions[extra], "one of them")
 
 
-def _damping(damping: Damping) -> Iterator[Problem]:
+def _damping(damping: BoardDamping) -> Iterator[Problem]:
+    if damping.estimate == "on" and damping.is_given:
+        message = "cannot be combined with damping that the case gives: the estimate would replace it"
+        yield Problem("shock.damping.estimate", message, damping.estimate, "auto, off")
     ratios = {"mass_ratio": damping.mass_ratio, "stiffness_ratio": damping.stiffness_ratio}
     used = [name for name, value in ratios.items() if value]
     if used and damping.frequency is None:

@@ -24,10 +24,12 @@ def of_joint_meshes(case: BoardDropCase) -> dict[str, Decision]:
 
 
 def with_influence(effects: dict, case: BoardDropCase) -> dict[str, Any]:
-    """Return the effects of a run with their predicted influence, where there is a prediction."""
+    """Return the effects of a run with their predicted influence, and the ratio of damping, where there is one."""
     predicted = shock_effects(case)
     by_name: dict[str, Any] = {
         name: predicted.get(f"{name}_in_the_shock", predicted.get(name)) or {} for name in effects
     }
-    influence = {name: {"influence": item["influence"]} for name, item in by_name.items() if "influence" in item}
-    return {name: record | influence.get(name, {}) for name, record in effects.items()}
+    return {
+        name: record | {key: by_name[name][key] for key in ("influence", "ratio") if key in by_name[name]}
+        for name, record in effects.items()
+    }

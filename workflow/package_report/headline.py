@@ -29,7 +29,7 @@ NOTE = (
 
 def later_swings(shock: Shock, end: float) -> str:
     """Return a note that later swings may be larger, for an undamped run that ended automatically at ``end`` [s]."""
-    if shock.duration != "auto" or any(shock.damping.coefficients):
+    if shock.duration != "auto" or shock.damping.acts:
         return ""
     return (
         f" The run ends at {1e3 * end:.3g} ms, half a swing after the largest stress. The board is undamped, so later"
