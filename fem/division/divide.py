@@ -60,7 +60,7 @@ def by_buffer(whole: Whole, survey: Survey, rules: Rules) -> Division:
 
 
 def along_paths(whole: Whole, survey: Survey, rules: Rules) -> Division:
-    """Return the division of ``by_buffer``, with levels in the meso model if no load or stiffness damping forbids them."""
+    """Return the division of ``by_buffer``, with levels in the meso model unless a load or damping forbids them."""
     division = by_buffer(whole, survey, rules)
     meso = nodes_of(whole.mesh.cells, division.meso, len(whole.mesh.points))
     pushed = rules.pushed or meso[list(rules.shaken)].any()

@@ -14,7 +14,7 @@ SOURCE = "Steinberg 2000, eq. 9.52"
 def estimated_ratio(frequency: float) -> float:
     """Return the ratio of critical damping 1 / (2 Q) of a board's first mode, Q = sqrt(f1) with f1 in [Hz].
 
-    Valid for boards that respond in one bending mode; below 1/4 Hz, where it would reach one, it is limited to one.
+    Meant for circuit boards that respond in one bending mode; limited to less than one, which it reaches at 1/4 Hz.
     """
     return min(0.5 / math.sqrt(frequency), 1.0 - 1e-6)
 

@@ -24,8 +24,8 @@ SMALL = 0.1  # fraction of the largest deflection below which a zero crossing do
 def is_settled(history: Arrays, damped: bool = False) -> bool:
     """Return whether the largest stress of all joints has passed, and enough swings of the board after it.
 
-    Half an oscillation, a swing, is the time from the start to the first zero crossing of the board centre. It is at least half
-    the period of the first mode, since it includes the pulse.
+    Half an oscillation, a swing, is the time from the start to the first zero crossing of the board centre. It is at
+    least half the period of the first mode, since it includes the pulse.
 
     Args:
         history: Arrays named in ``WATCHED``: times (k,) [s], board centre (k, 3) [m], stresses (k, joints) [Pa].

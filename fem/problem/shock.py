@@ -61,8 +61,8 @@ class Coupling(Parameters):
     velocity and conserves momentum exactly, but its models wait for each other. With ``one_way`` the macro model drives
     the meso model without feedback. ``levels`` is the number of step levels of the meso model below the window; held
     velocity allows at most three, and only one with stiffness damping, springs, cooling stress or a large mass on nodes
-    of the meso model. ``buffer_layers`` is the number of layers of board elements between the joints and an interface of held
-    velocity; ``path_levels`` defines the buffers between levels.
+    of the meso model. ``buffer_layers`` is the number of layers of board elements between the joints and an interface
+    of held velocity; ``path_levels`` defines the buffers between levels.
     """
 
     scheme: Literal["auto", "held_velocity", "local_steps", "impulse", "gravouil_combescure"] = "auto"
@@ -194,10 +194,11 @@ class Shock(Parameters):
     neglects gravity below a thousandth of the peak. The stress at the upper interface of the joints is written at
     ``picture_times``. ``joint_layer`` is the thickness of the solder at either pad over which stress and plastic work
     are averaged. ``identical_joints`` repeats the shock with a flat package on truncated spheres of the same solder
-    volume; the difference is the effect of the joint shapes. ``duration = auto`` ends the shock when the joints have
-    passed their first peak and half a period of the board brought no higher one, at the latest one period of the board
-    after the pulse. ``filter`` is applied to accelerations and strain rates. ``modes`` is the number of natural
-    frequencies of the board, from the lowest; a quarter model has only the symmetric modes.
+    volume; the difference is the effect of the joint shapes. ``duration = auto`` ends the shock half a swing of the
+    board after the largest stress of its joints, once swings of a damped board have decayed (``output.settled``), at
+    the latest one period of the board after the pulse. ``filter`` is applied to accelerations and strain rates.
+    ``modes`` is the number of natural frequencies of the board, from the lowest; a quarter model has only the symmetric
+    modes.
     """
 
     service_condition: ServiceCondition | None = None

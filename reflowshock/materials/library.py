@@ -24,9 +24,10 @@ FR4 = Orthotropic(
 )
 # Laminate without copper, at room temperature: plain epoxy fibreglass, 2.0e6 psi and Poisson's ratio 0.12 in plane
 # (Steinberg, Vibration Analysis for Electronic Equipment, 3rd edition, 2000, by reading notes, not reread; he gives
-# 3.0e6 psi = 20.7 GPa with several full copper planes). Other data: 21-25 GPa in plane in tables; 16.9 GPa at 25 degC by
-# a line in temperature of packaging models, for which no public source was found. Assumed: across the plane the ratios of FR4, modulus 12.2/27.9 and G_xz 5.5/27.9 of that in plane;
-# density, Poisson's ratio across and expansion of FR4; G_xy = E / (2 (1 + nu)).
+# 3.0e6 psi = 20.7 GPa with several full copper planes). Other data: 21-25 GPa in plane in tables; 16.9 GPa at 25 degC
+# by a line in temperature of packaging models, for which no public source was found. Assumed: across the plane the
+# ratios of FR4, modulus 12.2/27.9 and G_xz 5.5/27.9 of that in plane; density, Poisson's ratio across and expansion of
+# FR4; G_xy = E / (2 (1 + nu)).
 FR4_LAMINATE = Orthotropic(
     density=1910.0,
     young_modulus_in_plane=13.8e9,

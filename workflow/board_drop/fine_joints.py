@@ -112,9 +112,7 @@ def with_end(fine: FineJoints, history: Path) -> FineJoints:
 
 def write_fine_joints(folder: Path, fine: FineJoints) -> None:
     """Write ``fine_joints.json`` into the folder of a shock."""
-    (folder / "fine_joints.json").write_text(
-        json.dumps(asdict(fine), indent=1) + "\n", encoding="utf-8"
-    )
+    (folder / "fine_joints.json").write_text(json.dumps(asdict(fine), indent=1) + "\n", encoding="utf-8")
 
 
 def read_fine_joints(folder: Path) -> FineJoints | None:

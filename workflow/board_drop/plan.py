@@ -81,7 +81,8 @@ def _shock(case: BoardDropCase, shock: ShockForecast) -> Table:
     table.add_row("fine joints", *_fine_joints(case))
     if case.shock.duration == "auto":
         longest, expected = short(longest_duration(case)), short(shock.share * longest_duration(case))
-        table.add_row("duration", f"about {expected}, at most {longest}", DECAYS if case.shock.damping.acts else SETTLES)
+        ending = DECAYS if case.shock.damping.acts else SETTLES
+        table.add_row("duration", f"about {expected}, at most {longest}", ending)
     table.add_row("window", short(shock.window), f"step of the macro model, {shock.windows} windows")
     table.add_row("steps per window", *_levels(shock))
     table.add_row("step ratio m", f"{shock.substeps}", f"step of the DNS {short(shock.window / shock.substeps)}")

@@ -60,6 +60,7 @@ PROBLEMS = {
     "shock.peak_acceleration": {"peak_acceleration": None, "pulse_duration": None},
     "shock.pulse_duration": {"pulse_duration": None},
     "shock.table": {"peak_acceleration": None, "pulse_duration": None, "service_condition": "B", "table": "a.csv"},
+    "shock.damping.estimate": {"damping": BoardDamping(estimate="on", mass_coefficient=10.0)},
     "shock.damping.frequency": {"damping": BoardDamping(mass_ratio=0.01)},
     "shock.numerics.kinematics": {
         "damping": BoardDamping(stiffness_coefficient=1e-9),
