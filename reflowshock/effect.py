@@ -13,27 +13,34 @@ SET_IN_CASE = "none: set in the case file"
 
 
 class Decision(TypedDict):
-    """Decision on an effect: state, reason and, if predicted, its expected relative influence on the result."""
+    """Decision on an effect: state, reason and, if predicted, its expected relative influence on the result.
+
+    Damping has its ratio of critical damping, too.
+    """
 
     on: bool
     why: str
     influence: NotRequired[float]
+    ratio: NotRequired[float]
 
 
-def decision(on: bool, why: str, influence: float | None = None) -> Decision:
+def decision(on: bool, why: str, influence: float | None = None, ratio: float | None = None) -> Decision:
     """Return a decision as a plain dictionary for plans and results.
 
     Args:
         on: Whether the effect acts.
         why: Reason in words.
         influence: Expected relative change of the result by the effect; None, if it is not predicted, omits the key.
+        ratio: Damping ratio, a share of critical damping; None, for all other effects, omits the key.
 
     Returns:
-        Dictionary with the keys ``on``, ``why`` and, if predicted, ``influence``.
+        Dictionary with the keys ``on``, ``why`` and, if given, ``influence`` and ``ratio``.
     """
     result: Decision = {"on": bool(on), "why": why}
     if influence is not None:
         result["influence"] = float(influence)
+    if ratio is not None:
+        result["ratio"] = float(ratio)
     return result
 
 

@@ -17,6 +17,7 @@ from reflowshock.fem.dynamics.participant import Restartable
 from reflowshock.fem.estimates.estimate import WindowPlan
 from reflowshock.fem.kernels.levels import Interface
 from reflowshock.fem.kernels.motion import add_impulse, add_rows
+from reflowshock.fem.loads.damping import WindowDrag
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.parallel.checkpoint_state import Rows, State
@@ -156,6 +157,7 @@ class VelocityFollower(Restartable):
     def __init__(self, body: Body, loads: list[Load], plan: WindowPlan, channels: InterfaceChannels) -> None:
         """Start at rest."""
         self._channels = channels
+        loads = WindowDrag.once_a_window(loads, plan.substeps)
         self.motion = WindowMotion(body, loads, plan, local_interface(body), np.zeros(len(body.mass)))
         self.plan = plan
         self.interface_work = 0.0

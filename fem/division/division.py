@@ -28,7 +28,7 @@ class Rules:
         copied: Fine cells of which the driving model has a coarse copy, shape (ne,); only for one-way coupling.
         copy: Coarse copies of these cells, shape (ne,); only for one-way coupling.
         sprung: Whether supports have springs.
-        pushed: Whether damping, springs or initial stress act in the meso model.
+        pushed: Whether stiffness-proportional damping, springs or initial stress act in the meso model.
         shaken: Nodes on which a large mass acts, shape (k,).
     """
 
@@ -57,7 +57,7 @@ class Rules:
             duration=duration,
             samples=shock.numerics.history_samples,
             sprung=sprung,
-            pushed=sprung or cooled or any(shock.damping.coefficients),
+            pushed=sprung or cooled or bool(shock.damping.coefficients[1]),
         )
 
     def plan(self, macro_step: float, meso_step: float) -> WindowPlan:

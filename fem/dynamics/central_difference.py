@@ -17,6 +17,7 @@ from reflowshock.fem.dynamics.motion import Motion
 from reflowshock.fem.forces.force import TermWithPath
 from reflowshock.fem.kernels.levels import Interface, count_impulses
 from reflowshock.fem.kernels.motion import add_pushed, advance
+from reflowshock.fem.loads.damping import WindowDrag
 from reflowshock.fem.loads.load import FineSupports, Load
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.step_levels import levels_of
@@ -49,6 +50,7 @@ class ExplicitMotion(Motion):
         self.body, self.step, self.time, self._body_work = body, step, 0.0, 0.0
         fine_supports = [FineSupports()] if levels_of(body.terms) else []
         self._loads = sorted([*loads, *fine_supports], key=lambda load: load.account == "damping")
+        self._drags = [load for load in self._loads if isinstance(load, WindowDrag)]
         mass = body.mass + extra_mass
         free = body.free.copy()
         free[held] = False
@@ -58,7 +60,8 @@ class ExplicitMotion(Motion):
         self._state = np.zeros((3, len(mass), 3))
         self.displacement, self.velocity, self.force = self._state
         self._substep, self._longest = 0, max(body.schedule)
-        self.ahead = np.zeros((len(mass) if self._longest > 1 else 0, 3))
+        self.ahead = np.zeros((len(mass) if self._longest > 1 or self._drags else 0, 3))
+        self.carried = np.empty(0, np.int64)
         self._tied = len(body.tie.slave) > 0
         self.slave_force = np.zeros((len(body.tie.slave), 3))
         self.gravity = self.body_acceleration(0.0)
@@ -78,7 +81,8 @@ class ExplicitMotion(Motion):
     @property
     def external_work(self) -> float:
         """Work of all loads on this rank's share of the mass [J]."""
-        return self._body_work + sum(load.work for load in self._loads if load.account == "external")
+        of_loads = sum(load.work for load in self._loads if load.account == "external")
+        return self._body_work + of_loads + sum(load.frame_work for load in self._loads)
 
     @property
     def damping_energy(self) -> float:
@@ -92,6 +96,7 @@ class ExplicitMotion(Motion):
     def add_mass(self, nodes: NDArray[np.integer], mass: NDArray[np.float64]) -> None:
         """Add masses of shape (k,) [kg] to free local nodes, outside the energy balance."""
         self.mobility[nodes] = 1.0 / (1.0 / self.mobility[nodes] + mass[:, None])
+        self.carried = np.append(self.carried, nodes)
 
     def launch(self, velocity: NDArray[np.float64]) -> None:
         """Give all free components an initial velocity of shape (3,) [m/s], damped, before the first step."""
@@ -102,6 +107,8 @@ class ExplicitMotion(Motion):
                 load.remove(self.force)
                 load.add(self)
         self.velocity -= 0.5 * self.step * (self.acceleration() - before)
+        for drag in self._drags:
+            drag.brake(self, 0.5)  # the velocity is that of the start, not the mean of a window
 
     def advance(self) -> None:
         """Advance displacement and velocity, slaves with their masters, by one step; then call ``update_force``."""
@@ -145,7 +152,13 @@ class ExplicitMotion(Motion):
             load.collect(self)
 
     def take_steps(self, count: int, interface: Interface | None = None) -> None:
-        """Take ``count`` steps; prescribed changes and impulses of the coupling interface are in ``interface``."""
+        """Take the ``count`` steps of a window; ``interface`` has prescribed changes and impulses of the coupling."""
+        self._take_undamped_steps(count, interface)
+        for drag in self._drags:
+            drag.brake(self)
+
+    def _take_undamped_steps(self, count: int, interface: Interface | None) -> None:
+        """Take steps by compiled code if no message, load or rest of a cycle forbids it."""
         full_cycles = self._substep == 0 and count % self._longest == 0
         if self.body.shared.exchanged or self._compiled is None or not full_cycles:
             self._take_single_steps(count, interface)

@@ -150,7 +150,7 @@ class ImplicitMotion(Motion):
         self._update_force()
         mass = (self.body.mass + self._extra)[:, None]
         self._acceleration[:] = np.where(self._free, self._total_force() / np.where(mass > 0.0, mass, np.inf), 0.0)
-        self._before = self._balance_fields()
+        self._before, self._base = self._balance_fields(), self.base_displacement()
         self._older = self._total_force()
         self._works[:] = 0.0, 0.0, self._stored_apart()
 
@@ -190,8 +190,11 @@ class ImplicitMotion(Motion):
         change, mean = self._before - before, 0.5 * (before + self._before)
         solved, prescribed = self._equations.owned, self._prescribed & self.body.shared.owned[:, None]
         moved, held = change[0], mean[4] + mean[5]
-        self._works[0] += float(mean[3][solved] @ moved[solved] - held[prescribed] @ moved[prescribed])
-        self._works[1] -= float(np.sum((mean[4] * moved)[self.body.shared.owned])) + self._gain(change, mean)
+        base, self._base = self._base, self.base_displacement()
+        dragged, by_table = mean[4][self.body.shared.owned], self._base - base
+        supplied = float(dragged.sum(axis=0) @ by_table)
+        self._works[0] += float(mean[3][solved] @ moved[solved] - held[prescribed] @ moved[prescribed]) + supplied
+        self._works[1] -= float(np.sum(dragged * moved[self.body.shared.owned])) - supplied + self._gain(change, mean)
         self._older = before[3:].sum(axis=0)
 
     def _gain(self, change: NDArray[np.float64], mean: NDArray[np.float64]) -> float:
@@ -242,7 +245,7 @@ class ImplicitMotion(Motion):
         self.body.tie.spread(self.displacement)
         self.body.tie.spread(self.velocity)
         self.slave_force = self._add_internal(self.displacement, self.force)
-        self._drag[:] = -self._mass_damping * self.body.mass[:, None] * self.velocity
+        self._drag[:] = -self._mass_damping * self.body.mass[:, None] * (self.velocity - self.base_velocity())
         if self._stiffness_damping:
             elastic = np.empty_like(self._drag)
             self._add_internal(self.velocity, elastic)
@@ -306,6 +309,7 @@ class ImplicitMotion(Motion):
         self.gravity = self.body_acceleration(self.time)
         for k, load in enumerate(self._loads):
             load.restore(state["loads"][str(k)])
+        self._base = self.base_displacement()
 
 
 def _check_linear(body: Body) -> None:

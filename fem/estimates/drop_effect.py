@@ -63,6 +63,10 @@ class Drop(Protocol):
         """Expected bending of the board by the shock."""
 
     @property
+    def frequency(self) -> float:
+        """First natural frequency of the board [Hz]."""
+
+    @property
     def bent_by_weight(self) -> float:
         """Static deflection of the board by its weight [m]."""
 

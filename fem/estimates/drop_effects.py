@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from reflowshock.effect import Decision, Switch, Toggle, decision
+from reflowshock.fem.estimates.board_damping import BoardDampingEffect
 from reflowshock.fem.estimates.drop_effect import Drop, DropEffect, DropRun
 from reflowshock.fem.estimates.material_effects import (
     OF_YIELD_STRESS,
@@ -186,32 +187,6 @@ class SolderPlasticity(DropEffect):
         return with_value(with_law, "shock.numerics.plasticity", "off" if acts else "on")
 
 
-class RayleighEffect(DropEffect):
-    """Rayleigh damping."""
-
-    name = "damping"
-    adds = "f = -(alpha M + beta K) v"
-    number = "xi omega T, xi = (alpha / omega + beta omega) / 2"
-    influence = "1 - exp(-xi omega T) of the first mode"
-    implementation = "reflowshock.fem.loads.damping.RayleighDamping"
-    switch = "shock.damping.* of a case, or none"
-    source = "Rayleigh"
-
-    def decide(self, drop: Drop) -> Decision:
-        """Decide by the coefficients, with the damping of the first mode of the board as influence."""
-        (alpha, beta), omega = drop.shock.damping.coefficients, drop.expected.omega
-        if not (alpha or beta):
-            return decision(False, "shock.damping is zero", 0.0)
-        ratio = 0.5 * (alpha / omega + beta * omega)
-        loss = -math.expm1(-ratio * omega * drop.duration)
-        return decision(True, f"{100.0 * ratio:.3g} % of critical damping in the board's first mode", loss)
-
-    def report(self, run: DropRun) -> Decision:
-        """Return the coefficients of Rayleigh damping."""
-        alpha, beta = run.shock.damping.coefficients
-        return decision(bool(alpha or beta), f"Rayleigh damping, alpha = {alpha:.4g} 1/s, beta = {beta:.4g} s")
-
-
 class Failing(DropEffect):
     """Failure criteria of joints and board."""
 
@@ -314,7 +289,7 @@ class Symmetry(DropEffect):
 DROP_EFFECTS: tuple[DropEffect | MaterialEffect, ...] = (
     WeightEffect(),
     FiniteRotation(),
-    RayleighEffect(),
+    BoardDampingEffect(),
     SolderPlasticity(),
     *OF_YIELD_STRESS,
     Failing(),

@@ -1,4 +1,4 @@
-"""Numba kernels of a substep apart from the internal force: update, Rayleigh damping, tie, packing of messages."""
+"""Numba kernels of a substep apart from the internal force: update, damping, tie, packing of messages."""
 
 import numpy as np
 from numba import njit
@@ -296,8 +296,8 @@ def link_velocities(rows, velocity, force, terms, link):
 
 
 @njit(cache=True, error_model="numpy")
-def add_damping(velocity, mobility, acceleration, coefficients, forces):
-    """Add the mass-proportional force -c m (v + dt/2 (f / m + g)) to the damping, and all damping to the force f.
+def add_damping(velocity, mobility, frame, coefficients, forces):
+    """Add the mass-proportional force -c m (v - v0 + dt/2 (f / m + g)) to the damping, and all damping to the force f.
 
     The loop runs over strips of all components together, as in ``move``; for the same reason no operation may be
     reordered or fused.
@@ -305,7 +305,8 @@ def add_damping(velocity, mobility, acceleration, coefficients, forces):
     Args:
         velocity: Velocity v half a step back, shape (n, 3) [m/s].
         mobility: Inverse mass, zero where the velocity is prescribed and no drag acts, shape (n, 3) [1/kg].
-        acceleration: Acceleration g of the body force, shape (3,) [m/s^2].
+        frame: Acceleration g of the body force [m/s^2], and velocity v0 of the frame in which the drag is zero [m/s],
+            shape (2, 3).
         coefficients: Damping coefficient c [1/s] and half time step dt/2 [s], a tuple of two scalars.
         forces: Damping (stiffness-proportional on entry, total on return) and nodal force f (without damping on entry,
             with it on return), two arrays of shape (n, 3) [N].
@@ -313,19 +314,54 @@ def add_damping(velocity, mobility, acceleration, coefficients, forces):
     own, total = forces[0].reshape(-1), forces[1].reshape(-1)
     moving, inverse = velocity.reshape(-1), mobility.reshape(-1)
     rate, half = coefficients
-    fall = np.empty(STRIP)
+    fall, base = np.empty(STRIP), np.empty(STRIP)
     for i in range(STRIP):
-        fall[i] = acceleration[i % 3]
+        fall[i], base[i] = frame[0, i % 3], frame[1, i % 3]
     for begin in range(0, len(moving), STRIP):
         end = min(begin + STRIP, len(moving))
         before, factor = moving[begin:end], inverse[begin:end]
         damping, force = own[begin:end], total[begin:end]
         for i in range(end - begin):
             others = force[i] + damping[i]
-            middle = before[i] + half * (others * factor[i] + fall[i])
+            middle = before[i] - base[i] + half * (others * factor[i] + fall[i])
             drag = -rate * (1.0 / (factor[i] if factor[i] > 0.0 else np.inf)) * middle
             damping[i] += drag
             force[i] = others + drag
+
+
+@njit(cache=True, error_model="numpy")
+def brake(velocity, forces, nodes, frame, coefficients):
+    """Add the drag of a window to the force f, one share, and to the force ahead, all other shares.
+
+    The drag d = -c m (v - v0 + dt/2 ((f + ahead) / m + g)) acts once in a window.
+
+    Args:
+        velocity: ``(n, 3)`` [m/s], v half a step back.
+        forces: ``(n, 3)`` [N] twice: f, and the force ahead, which acts in addition in the coming step.
+        nodes: ``(n, 3)`` inverse mass [1/kg], zero without drag; and ``(n,)`` whether the work on a node counts.
+        frame: ``(2, 3)``: g of the body force [m/s^2], and velocity v0 of the frame in which the drag is zero [m/s].
+        coefficients: c [1/s], dt [s], and number of shares, the steps of a window.
+
+    Returns:
+        Sums over the nodes that count: power of the drag in the frame before and after the step [W], and drag [N].
+    """
+    force, ahead, mobility, owned = forces[0], forces[1], nodes[0], nodes[1]
+    rate, step, shares = coefficients
+    before, after, total = 0.0, 0.0, np.zeros(3)
+    for i in range(len(mobility)):
+        for c in range(3):
+            inverse = mobility[i, c]
+            if inverse > 0.0:
+                relative = velocity[i, c] - frame[1, c]
+                kick = step * ((force[i, c] + ahead[i, c]) * inverse + frame[0, c])
+                drag = -rate * (relative + 0.5 * kick) / inverse
+                force[i, c] += drag
+                ahead[i, c] += (shares - 1.0) * drag
+                if owned[i]:
+                    before += drag * relative
+                    after += drag * (relative + kick + step * shares * drag * inverse)
+                    total[c] += drag
+    return before, after, total
 
 
 @njit(cache=True, fastmath=FINITE)

@@ -40,7 +40,9 @@ class Loaded(ABC):
         force: Nodal force at ``time`` without body forces, shape (n, 3) [N]; summed over ranks, with the forces of
             slave nodes moved to their masters.
         gravity: Sum of the body accelerations of the loads at ``time``, shape (3,) [m/s^2].
+        ahead: Force that explicit steps add to ``force`` in the coming step, shape (n, 3) or (0, 3) [N].
         mobility: Inverse mass of explicit steps, zero where the velocity is prescribed, shape (n, 3) [1/kg].
+        carried: Local nodes of a large mass, which moves them as the table moves, shape (k,).
         counted_mass: Nodal mass in the energy balance of this rank, shape (n,) [kg].
     """
 
@@ -50,8 +52,10 @@ class Loaded(ABC):
     displacement: NDArray[np.float64]
     velocity: NDArray[np.float64]
     force: NDArray[np.float64]
+    ahead: NDArray[np.float64]
     gravity: NDArray[np.float64]
     mobility: NDArray[np.float64]
+    carried: NDArray[np.integer]
     counted_mass: NDArray[np.float64]
     _loads: Sequence["Load"]
 
@@ -92,11 +96,13 @@ class Load:
         checkpointed: Names of the attributes that change with time, each with its kind: a ``sum`` over ranks, the
             ``same`` on all ranks, or rows of all local ``nodes``.
         work: Work done so far on this rank's share of the model [J].
+        frame_work: External work in addition: of damping at the velocity of the table [J].
     """
 
     account: ClassVar[Literal["external", "damping"]] = "external"
     checkpointed: ClassVar[Mapping[str, Checkpointed]] = {}
     work: float = 0.0
+    frame_work: float = 0.0
 
     def acceleration(self, time: float) -> NDArray[np.float64]:
         """Return the acceleration ``(3,)`` [m/s^2] of all masses at a time [s], i.e. the body force per mass."""

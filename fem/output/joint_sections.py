@@ -1,9 +1,9 @@
 """Section forces of joints at board and package, from the nodal forces of the solder elements.
 
 The solder receives F_n = f_n + m_n (a_n - g + alpha v_n) at the nodes of a pad face, where f is the internal force of
-its elements (stiffness-proportional damping included) and m their mass. Since inner nodes obey the equation of motion,
-the forces and moments of both faces add up exactly to the inertia of the solder, sum of m (a - g + alpha v). With
-finite rotations, positions, areas and normals refer to the deformed state.
+its elements (stiffness-proportional damping included), m their mass and v the velocity relative to the table. Since
+inner nodes obey the equation of motion, the forces and moments of both faces add up exactly to the inertia of the
+solder, sum of m (a - g + alpha v). With finite rotations, positions, areas and normals refer to the deformed state.
 """
 
 from dataclasses import dataclass
@@ -90,7 +90,7 @@ class JointSections:
         internal = self._elements.forces(motion.displacement, velocity)
         inertial = motion.acceleration() - motion.gravity
         if self._alpha:
-            inertial += self._alpha * motion.present_velocity()
+            inertial += self._alpha * (motion.present_velocity() - motion.base_velocity())
         self._tie.spread(inertial)
         points = self._points + motion.displacement if self._finite else self._points
         pad_mass, solder = self._pad_mass, self._solder

@@ -1,4 +1,9 @@
-"""End criterion of a shock: the largest joint stress has passed, and half a board oscillation brought no larger one.
+"""End criterion of a shock: the largest joint stress has passed, and no later swing of the board is larger.
+
+Of a damped board, the two latest swings, an oscillation, must have stayed below ``DECAYED`` times the largest stress:
+modes of different frequencies may add up later, but mass-proportional damping reduces all of them at the same rate, so
+that a larger stress would have to outgrow two swings in spite of it. An undamped board never settles in this sense; its
+shock ends half an oscillation after the largest stress.
 
 The von Mises stress of yielded solder grows with every oscillation by hardening, so only peel stress is used then.
 """
@@ -11,24 +16,44 @@ from reflowshock.fem.output.ranking import ENDS, PEEL, PLASTIC_WORK, VON_MISES, 
 HISTORIES = tuple(f"{measure.history}_{end}" for measure in (PEEL, VON_MISES, PLASTIC_WORK) for end in ENDS)
 WATCHED = ("time", "board_centre", *HISTORIES)  # plastic work exists only if solder may yield
 SAME = 0.99  # fraction of the largest stress that counts as having reached the peak
+DECAYED = 0.9  # fraction of the largest stress that later swings of a damped board must not exceed
+LATER_SWINGS = 2.0
 SMALL = 0.1  # fraction of the largest deflection below which a zero crossing does not count
 
 
-def is_settled(history: Arrays) -> bool:
-    """Return whether the largest stress of all joints occurred more than half an oscillation of the board ago.
+def is_settled(history: Arrays, damped: bool = False) -> bool:
+    """Return whether the largest stress of all joints has passed, and enough swings of the board after it.
 
-    Then a run may end early. Half an oscillation is the time from the start to the first zero crossing of the board
-    centre. It is at least half the period of the first mode, since it includes the pulse.
+    Then a run may end early. Half an oscillation, a swing, is the time from the start to the first zero crossing of the
+    board centre. It is at least half the period of the first mode, since it includes the pulse.
 
     Args:
         history: Arrays named in ``WATCHED``: ``time``, shape (k,) [s], ``board_centre``, shape (k, 3) [m], and for the
             ends ``board`` and ``package`` the stresses, shape (k, joints) [Pa], and plastic work of the joints.
+        damped: Whether the board is damped; then the two latest swings must have decayed.
     """
+    end = needed_end(history)
+    if end is None or history["time"][-1] < end:
+        return False
+    return not damped or latest_swings(history) <= DECAYED
+
+
+def needed_end(history: Arrays) -> float | None:
+    """Return the time half an oscillation after the largest stress [s], None before the board first returns."""
     time, half = history["time"], half_oscillation(history["time"], history["board_centre"][:, 2])
     if half is None or not PEEL.worse(history).size:
-        return False
-    latest = max(float(time[_peak_sample(measure.worse(history))]) for measure in settling_measures(history))
-    return bool(time[-1] - latest >= half)
+        return None
+    return half + max(float(time[_peak_sample(measure.worse(history))]) for measure in settling_measures(history))
+
+
+def latest_swings(history: Arrays) -> float:
+    """Return the largest stress in the two latest swings over the largest of all; one if it is in them."""
+    time, half = history["time"], half_oscillation(history["time"], history["board_centre"][:, 2])
+    if half is None:
+        return 1.0
+    latest = time > time[-1] - LATER_SWINGS * half
+    stresses = [measure.worse(history).max(axis=1) for measure in settling_measures(history)]
+    return max(float(stress[latest].max() / stress.max()) for stress in stresses)
 
 
 def settling_measures(history: Arrays) -> tuple[Measure, ...]:

@@ -60,9 +60,9 @@ class Coupling(Parameters):
     Where no buffer fits, ``auto`` takes ``gravouil_combescure``, which needs none. ``impulse`` has the buffer of held
     velocity and conserves momentum exactly, but its models wait for each other. With ``one_way`` the macro model drives
     the meso model without feedback. ``levels`` is the number of step levels of the meso model below the window; held
-    velocity allows at most three, and only one with damping, springs, cooling stress or a large mass on nodes of the
-    meso model. ``buffer_layers`` is the number of layers of board elements between the joints and an interface of held
-    velocity; ``path_levels`` defines the buffers between levels.
+    velocity allows at most three, and only one with stiffness damping, springs, cooling stress or a large mass on nodes
+    of the meso model. ``buffer_layers`` is the number of layers of board elements between the joints and an interface
+    of held velocity; ``path_levels`` defines the buffers between levels.
     """
 
     scheme: Literal["auto", "held_velocity", "local_steps", "impulse", "gravouil_combescure"] = "auto"
@@ -110,6 +110,28 @@ class Damping(Parameters):
         angular = 2.0 * math.pi * (self.frequency or math.inf)
         by_mass = 2.0 * angular * self.mass_ratio if self.mass_ratio else 0.0
         return self.mass_coefficient + by_mass, self.stiffness_coefficient + 2.0 * self.stiffness_ratio / angular
+
+
+class BoardDamping(Damping):
+    """Damping of a dropped board; ``estimate = auto`` or ``on`` estimates it from the first natural frequency.
+
+    The estimate is a ratio of critical damping 1 / (2 sqrt(f1 / Hz)) of the first mode, proportional to the mass, so
+    that the time step is unchanged. ``auto`` takes the damping that a case gives and estimates it otherwise; ``off``
+    leaves the board undamped unless the case gives damping.
+    """
+
+    estimate: Switch = "auto"
+
+    @property
+    def is_given(self) -> bool:
+        """Whether there are coefficients or ratios."""
+        terms = self.mass_coefficient, self.stiffness_coefficient, self.mass_ratio, self.stiffness_ratio
+        return any(terms)
+
+    @property
+    def acts(self) -> bool:
+        """Whether a drop is damped: the case gives the damping, or it is estimated."""
+        return self.is_given or self.estimate != "off"
 
 
 class ShockNumerics(Parameters):
@@ -172,10 +194,11 @@ class Shock(Parameters):
     neglects gravity below a thousandth of the peak. The stress at the upper interface of the joints is written at
     ``picture_times``. ``joint_layer`` is the thickness of the solder at either pad over which stress and plastic work
     are averaged. ``identical_joints`` repeats the shock with a flat package on truncated spheres of the same solder
-    volume; the difference is the effect of the joint shapes. ``duration = auto`` ends the shock when the joints have
-    passed their first peak and half a period of the board brought no higher one, at the latest one period of the board
-    after the pulse. ``filter`` is applied to accelerations and strain rates. ``modes`` is the number of natural
-    frequencies of the board, from the lowest; a quarter model has only the symmetric modes.
+    volume; the difference is the effect of the joint shapes. ``duration = auto`` ends the shock half a swing of the
+    board after the largest stress of its joints, once swings of a damped board have decayed (``output.settled``), at
+    the latest one period of the board after the pulse. ``filter`` is applied to accelerations and strain rates.
+    ``modes`` is the number of natural frequencies of the board, from the lowest; a quarter model has only the symmetric
+    modes.
     """
 
     service_condition: ServiceCondition | None = None
@@ -190,7 +213,7 @@ class Shock(Parameters):
     modes: int = Field(0, ge=0, le=200)
     method: Literal["direct", "large_mass"] = "direct"
     gravity: Literal["auto", "on", "off"] = "auto"
-    damping: Damping = Damping()
+    damping: BoardDamping = BoardDamping()
     filter: LowPass = LowPass()
     failure: Failure = Failure()
     ranks: Ranks = Ranks()

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from reflowshock.fem.problem.attachment_checks import filter_problems
 from reflowshock.fem.problem.kinematics import TURNING
-from reflowshock.fem.problem.shock import Damping, JointCoupling, Shock
+from reflowshock.fem.problem.shock import BoardDamping, JointCoupling, Shock
 from reflowshock.problem import Problem
 
 
@@ -21,7 +21,6 @@ def problems(shock: Shock) -> list[Problem]:
         *_pulse(shock),
         *_beyond_the_end(shock),
         *_damping(shock.damping),
-        *_large_mass(shock),
         *_finite(shock),
         *_coupling(shock.coupling),
         *_filter(shock),
@@ -48,7 +47,10 @@ def _pulse(shock: Shock) -> Iterator[Problem]:
         yield Problem(extra, message, definitions[extra], "one of them")
 
 
-def _damping(damping: Damping) -> Iterator[Problem]:
+def _damping(damping: BoardDamping) -> Iterator[Problem]:
+    if damping.estimate == "on" and damping.is_given:
+        message = "cannot be combined with damping that the case gives: the estimate would replace it"
+        yield Problem("shock.damping.estimate", message, damping.estimate, "auto, off")
     ratios = {"mass_ratio": damping.mass_ratio, "stiffness_ratio": damping.stiffness_ratio}
     used = [name for name, value in ratios.items() if value]
     if used and damping.frequency is None:
@@ -71,16 +73,6 @@ def _beyond_the_end(shock: Shock) -> Iterator[Problem]:
         latest = max(times, default=0.0) if isinstance(times, tuple) else times or 0.0
         if latest > shock.duration:
             yield Problem(key, "is after the end of the shock", times, "<= shock.duration")
-
-
-def _large_mass(shock: Shock) -> Iterator[Problem]:
-    if shock.method == "large_mass" and shock.damping.coefficients[0]:
-        yield Problem(
-            "shock.method",
-            "cannot be combined with mass-proportional damping, which would slow the moving table",
-            shock.method,
-            "direct, or stiffness-proportional damping",
-        )
 
 
 def _finite(shock: Shock) -> Iterator[Problem]:

@@ -97,7 +97,6 @@ def _large_mass(problem: StructureProblem) -> Iterator[Problem]:
     if not any(set(support.hold) == set(AXES) for support in problem.supports.values()):
         yield Problem(key, "needs a support that it can move: one that holds x, y, z", "large_mass", "direct")
     moved = {"initial_velocity": any(problem.dynamics.initial_velocity)}
-    moved |= {"mass-proportional damping": bool(problem.dynamics.damping.coefficients[0])}
     moved |= {f"loads.{name}": isinstance(load, PrescribedMotion) for name, load in problem.loads.items()}
     for cause in [name for name, is_present in moved.items() if is_present]:
         message = f"cannot be combined with {cause}: its velocities would be absolute, not relative to the supports"

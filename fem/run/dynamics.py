@@ -20,6 +20,7 @@ from reflowshock.fem.dynamics.implicit import ImplicitMotion
 from reflowshock.fem.dynamics.motion import Motion
 from reflowshock.fem.dynamics.participant import Participant, SingleModel, explicit_motion
 from reflowshock.fem.errors import AgreedError
+from reflowshock.fem.loads.damping import WindowDrag
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.factorisation import FactorCost
@@ -161,7 +162,8 @@ def make_participants(comms: Communicators, problem: DynamicProblem, models: Mod
         coupled = couple(comms, bodies, loads, steps.plan, scheme)
     else:
         [(role, body)] = bodies.items()
-        motion = _make_motion(comms.models[role], body, loads[role], steps.plan.step, problem.request)
+        single = loads[role] if problem.request.implicit else WindowDrag.once_a_window(loads[role], steps.plan.substeps)
+        motion = _make_motion(comms.models[role], body, single, steps.plan.step, problem.request)
         coupled = CoupledRun({role: SingleModel(motion, steps.plan)}, [])
     for participant in coupled.participants.values():
         if any(problem.request.initial_velocity):

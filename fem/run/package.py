@@ -115,7 +115,8 @@ class PackageDrop:
     @property
     def is_over(self) -> Callable[[History], bool] | None:
         """Function that decides whether the shock has settled before its longest duration, or None."""
-        return (lambda history: is_settled(history.arrays(WATCHED))) if self.request.settles else None
+        damped = self.request.shock.damping.coefficients[0] > 0.0
+        return (lambda history: is_settled(history.arrays(WATCHED), damped)) if self.request.settles else None
 
     def find_modes(
         self, comms: Communicators, models: Mapping[Role, Model[JointTables]], steps: Steps

@@ -6,8 +6,11 @@ marks published constants that were not checked against the original paper: veri
 
 from reflowshock.materials.parameters import Isotropic, JohnsonCook, Material, Orthotropic
 
-# H tables 3-5; the shear modulus G_xz and the density are from the same widely used FR4 data set, e.g.
-# Syed et al., ECTC 2005, and its successors; H leaves them out (PHYSICS 1).
+# Board with its copper layers, at room temperature. H tables 3-5; the shear modulus G_xz and the density are from the
+# same widely used FR4 data set, e.g. Syed et al., ECTC 2005, and its successors; H leaves them out (PHYSICS 1). The
+# moduli are effective ones of board and copper: with them the board of JESD22-B111 has a first natural frequency of
+# 273.5 Hz (cases/jedec_board) against about 280 Hz measured on a board with eight copper layers (Fuchs & Major,
+# Frattura ed Integrita Strutturale 15, 64, 2011). They are too stiff for a laminate without copper, see below.
 FR4 = Orthotropic(
     density=1910.0,
     young_modulus_in_plane=27.924e9,
@@ -16,6 +19,23 @@ FR4 = Orthotropic(
     poisson_ratio_out_of_plane=0.39,
     shear_modulus_in_plane=12.6e9,
     shear_modulus_out_of_plane=5.5e9,
+    thermal_expansion_in_plane=16e-6,
+    thermal_expansion_out_of_plane=84e-6,
+)
+# Laminate without copper, at room temperature: plain epoxy fibreglass, 2.0e6 psi and Poisson's ratio 0.12 in plane
+# (Steinberg, Vibration Analysis for Electronic Equipment, 3rd edition, 2000, by reading notes, not reread; he gives
+# 3.0e6 psi = 20.7 GPa with several full copper planes). Other data: 21-25 GPa in plane in tables; 16.9 GPa at 25 degC
+# by a line in temperature of packaging models, for which no public source was found. Assumed: across the plane the
+# ratios of FR4, modulus 12.2/27.9 and G_xz 5.5/27.9 of that in plane; density, Poisson's ratio across and expansion of
+# FR4; G_xy = E / (2 (1 + nu)).
+FR4_LAMINATE = Orthotropic(
+    density=1910.0,
+    young_modulus_in_plane=13.8e9,
+    young_modulus_out_of_plane=6.0e9,
+    poisson_ratio_in_plane=0.12,
+    poisson_ratio_out_of_plane=0.39,
+    shear_modulus_in_plane=6.16e9,
+    shear_modulus_out_of_plane=2.7e9,
     thermal_expansion_in_plane=16e-6,
     thermal_expansion_out_of_plane=84e-6,
 )
@@ -79,6 +99,8 @@ SNPB = Isotropic(
 
 LIBRARY: dict[str, Material] = {
     "FR4": FR4,
+    "FR4_board": FR4,  # the same under the name of what it is: a board with its copper layers
+    "FR4_laminate": FR4_LAMINATE,
     "copper": COPPER,
     "silicon": SILICON,
     "mould_compound": MOULD_COMPOUND,

@@ -48,7 +48,9 @@ class Materials(Parameters):
     """Material of each role that a part of the mesh can have.
 
     Each is a name from the library, such as "SAC305", or a table of constants. Solder from the library is plastic
-    unless the shock switches plasticity off.
+    unless the shock switches plasticity off. "FR4", or "FR4_board", is a board with its copper layers, "FR4_laminate"
+    a laminate without copper. Board and substrate have "FR4" in drops and while cooling; there no copper layers are
+    modelled either.
     """
 
     board: NamedMaterial = FR4

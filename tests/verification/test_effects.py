@@ -15,11 +15,11 @@ from mpi4py import MPI
 from reflowshock.cases.hard.trials.grids import grid, mesh_of
 from reflowshock.fem.coupling.one_way import OneWay
 from reflowshock.fem.coupling.scheme import scheme_of
+from reflowshock.fem.estimates.board_damping import BoardDampingEffect
 from reflowshock.fem.estimates.drop_effects import (
     NEGLIGIBLE_STIFFENING,
     NEGLIGIBLE_WEIGHT,
     Failing,
-    RayleighEffect,
     WeightEffect,
     called_for,
 )
@@ -29,7 +29,7 @@ from reflowshock.fem.loads.pretension import Pretension
 from reflowshock.fem.mesh.supports import held_components
 from reflowshock.fem.model.steps import mass_factor
 from reflowshock.fem.problem.failure import Failure
-from reflowshock.fem.problem.shock import Damping, JointCoupling
+from reflowshock.fem.problem.shock import BoardDamping, JointCoupling
 from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.fem.statics.plates import RigidPlates
 from reflowshock.fem.statics.structure import ThermalStructure
@@ -287,7 +287,7 @@ def _(effect, _folder):
     plain = scene.loads_of(body, scene.shock())
     switched = {
         "gravity_in_the_shock": {"gravity": "on"},
-        "damping": {"damping": Damping(mass_coefficient=1.0)},
+        "damping": {"damping": BoardDamping(mass_coefficient=1.0)},
         "large_mass": {"method": "large_mass"},
     }[effect.name]
     acting = scene.loads_of(body, scene.shock(**switched))
@@ -310,9 +310,9 @@ def _(_effect, _folder):
 def _(_effect, _folder):
     body, step = scene.strip()
     duration, rate = 3e-4, 1.0
-    damped = scene.shock(damping=Damping(mass_coefficient=rate))
-    drop = SimpleNamespace(shock=damped, duration=duration, expected=SimpleNamespace(omega=1.5e4))
-    predicted = RayleighEffect().decide(drop)["influence"]
+    damped = scene.shock(damping=BoardDamping(mass_coefficient=rate))
+    drop = SimpleNamespace(shock=damped, duration=duration, frequency=1.5e4 / (2 * np.pi))
+    predicted = BoardDampingEffect().decide(drop)["influence"]
     both = [scene.moved(body, step, scene.loads_of(body, item), duration)[1] for item in (scene.shock(), damped)]
     assert abs(both[1] / both[0] - 1.0) < predicted < 1e-3
 

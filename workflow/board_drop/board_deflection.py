@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from reflowshock.effect import Decision
+from reflowshock.fem.estimates.board_damping import with_estimate
 from reflowshock.fem.estimates.drop_effect import Deflection
 from reflowshock.fem.estimates.drop_effects import SolderPlasticity, called_for
 from reflowshock.workflow.board_drop.duration import first_mode, longest_duration
@@ -45,6 +46,11 @@ def expected_deflection(case: "BoardDropCase") -> Deflection:
     length, omega = first_mode(case)
     deflection = first_mode_peak(omega, shock_pulse(case.shock).pulse.integral, longest_duration(case))
     return Deflection(deflection, math.pi / length * deflection, omega)
+
+
+def board_frequency(case: "BoardDropCase") -> float:
+    """Return the estimated first natural frequency of the board at small rotations [Hz]."""
+    return first_mode(case)[1] / (math.tau * PERIOD_RATIO)
 
 
 def expected_duration(case: "BoardDropCase") -> float:
@@ -127,13 +133,14 @@ def expected_peel(case: "BoardDropCase", deflection: Deflection) -> float:
 def decided(case: "BoardDropCase") -> "BoardDropCase":
     """Return a copy of a case in which ``auto`` settings of the shock have their decided values.
 
-    These are the duration, the kinematics ("small" or not), and whether the solder yields.
+    These are the duration, the damping, the kinematics ("small" or not), and whether the solder yields.
 
     Raises:
         PulseError: The table of the pulse cannot be read.
     """
     scene, numerics = DropScene(case), case.shock.numerics
-    update: dict[str, Any] = {"duration": scene.duration}
+    damping = with_estimate(case.shock.damping, scene.frequency)
+    update: dict[str, Any] = {"duration": scene.duration, "damping": damping}
     if numerics.kinematics == "auto":
         kinematics, _ = called_for(scene.expected.largest / scene.thickness, scene.cooled)
         update["numerics"] = numerics.model_copy(update={"kinematics": kinematics})
@@ -203,6 +210,11 @@ class DropScene:
     def expected(self) -> Deflection:
         """Expected bending of the board by the shock."""
         return expected_deflection(self.case)
+
+    @property
+    def frequency(self) -> float:
+        """First natural frequency of the board [Hz]."""
+        return board_frequency(self.case)
 
     @property
     def bent_by_weight(self) -> float:

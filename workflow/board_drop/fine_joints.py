@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,10 +21,19 @@ FINE, CRITICAL = "shock.coupling.fine_joints", "shock.coupling.critical_joints"
 
 @dataclass(frozen=True, slots=True)
 class FineJoints:
-    """Names of the fine joints, or "all", and the reason for the choice."""
+    """Fine joints of a two-scale run.
+
+    Attributes:
+        names: Their names, or "all".
+        why: Reason for the choice.
+        end: End of the shock [s], if the run that found them decides it; else None.
+        end_why: Reason for the end.
+    """
 
     names: tuple[str, ...] | str
     why: str
+    end: float | None = None
+    end_why: str = ""
 
 
 def needs_coarse_joints(coupling: "JointCoupling | None") -> bool:
@@ -97,16 +106,34 @@ def most_stressed(history: Path, count: int) -> FineJoints:
     return FineJoints(tuple(str(names[k]) for k in order[:count]), why)
 
 
+def with_end(fine: FineJoints, history: Path) -> FineJoints:
+    """Return the fine joints with the end of a damped shock, half a swing after the largest stress of a coarse run."""
+    import numpy as np
+
+    from reflowshock.fem.output.settled import DECAYED, WATCHED, latest_swings, needed_end
+    from reflowshock.workflow.case.text import short
+
+    with np.load(history) as file:
+        arrays = {name: file[name] for name in WATCHED if name in file}
+    end, computed, rest = needed_end(arrays), float(arrays["time"][-1]), latest_swings(arrays)
+    if end is None or end > computed:
+        return replace(fine, end=computed, end_why=f"longest duration, {short(computed)}; the board still swings")
+    why = (
+        f"half a swing after the largest stress in a run with coarse joints to {short(computed)}, whose two latest"
+        f" swings reached {rest:.2g} of it"
+    )
+    later = "damping excludes larger ones later" if rest <= DECAYED else "larger ones later are not excluded"
+    return replace(fine, end=end, end_why=f"{why}; {later}")
+
+
 def write_fine_joints(folder: Path, fine: FineJoints) -> None:
     """Write ``fine_joints.json`` into the folder of a shock.
 
     Args:
         folder: Folder of the shock, which must exist.
-        fine: Names of the fine joints, or "all", and the reason.
+        fine: Names of the fine joints, or "all", the reason, and the end of the shock if it was found.
     """
-    (folder / "fine_joints.json").write_text(
-        json.dumps({"names": fine.names, "why": fine.why}, indent=1) + "\n", encoding="utf-8"
-    )
+    (folder / "fine_joints.json").write_text(json.dumps(asdict(fine), indent=1) + "\n", encoding="utf-8")
 
 
 def read_fine_joints(folder: Path) -> FineJoints | None:
@@ -120,7 +147,7 @@ def read_fine_joints(folder: Path) -> FineJoints | None:
         return None
     table = json.loads(path.read_text(encoding="utf-8"))
     names = table["names"]
-    return FineJoints(names if isinstance(names, str) else tuple(names), table["why"])
+    return FineJoints(**(table | {"names": names if isinstance(names, str) else tuple(names)}))
 
 
 def problems(case: "BoardDropCase") -> Iterator[Problem]:

@@ -14,6 +14,7 @@ from reflowshock.workflow.process.environment import available_cores
 from reflowshock.workflow.process.terminal import REFLOW_SPEED, new_table, style_text
 
 SETTLES = "ends half a swing of the board after the largest stress of the joints"
+DECAYS = f"{SETTLES}; two more swings of a coarse run, or of this one, exclude larger ones later"
 
 
 def package_tables(case: PackageCase, outlook: PackageForecast) -> Iterator[RenderableType]:
@@ -88,7 +89,8 @@ def _shock(case: BoardDropCase, shock: ShockForecast) -> Table:
     table.add_row("fine joints", *_fine_joints(case))
     if case.shock.duration == "auto":
         longest, expected = short(longest_duration(case)), short(shock.share * longest_duration(case))
-        table.add_row("duration", f"about {expected}, at most {longest}", SETTLES)
+        ending = DECAYS if case.shock.damping.acts else SETTLES
+        table.add_row("duration", f"about {expected}, at most {longest}", ending)
     table.add_row("window", short(shock.window), f"step of the macro model, {shock.windows} windows")
     table.add_row("steps per window", *_levels(shock))
     table.add_row("step ratio m", f"{shock.substeps}", f"step of the DNS {short(shock.window / shock.substeps)}")

@@ -28,18 +28,21 @@ def of_joint_meshes(case: BoardDropCase) -> dict[str, Decision]:
 
 
 def with_influence(effects: dict, case: BoardDropCase) -> dict[str, Any]:
-    """Return the effects of a run with their predicted influence, where there is a prediction.
+    """Return the effects of a run with their predicted influence and the ratio of damping, where they are known.
 
     Args:
         effects: Name of an effect -> its record in a run (``on``, ``why``); not changed.
         case: Case of the run.
 
     Returns:
-        Records by name, with ``influence``, the expected relative change of the result, where it is predicted.
+        Records by name, with ``influence``, the expected relative change of the result, where it is predicted, and
+            ``ratio`` of critical damping.
     """
     predicted = shock_effects(case)
     by_name: dict[str, Any] = {
         name: predicted.get(f"{name}_in_the_shock", predicted.get(name)) or {} for name in effects
     }
-    influence = {name: {"influence": item["influence"]} for name, item in by_name.items() if "influence" in item}
-    return {name: record | influence.get(name, {}) for name, record in effects.items()}
+    return {
+        name: record | {key: by_name[name][key] for key in ("influence", "ratio") if key in by_name[name]}
+        for name, record in effects.items()
+    }

@@ -11,6 +11,7 @@ from reflowshock.workflow.board_drop.fine_joints import (
     most_stressed,
     named_joints,
     needs_coarse_joints,
+    with_end,
     write_fine_joints,
 )
 from reflowshock.workflow.board_drop.shock_cooling import with_initial_stress
@@ -26,7 +27,8 @@ IDENTICAL_TITLE = "identical joints"
 def find_fine_joints(run: Run[BoardDropCase], folder: Path) -> FineJoints:
     """Return the fine joints of the two-scale run; find the critical ones by a run with all joints coarse.
 
-    That run, in the folder ``coarse``, is a two-scale run as well, because the board then keeps its large step.
+    That run, in the folder ``coarse``, is a two-scale run as well, because the board then keeps its large step. It also
+    finds the end of a damped shock of automatic duration.
 
     Args:
         run: Run folder with assembly and joints, case, cores.
@@ -47,6 +49,8 @@ def find_fine_joints(run: Run[BoardDropCase], folder: Path) -> FineJoints:
     request["settles"] = run.case.shock.duration == "auto"
     run_fem(run, folder / "coarse", request, "shock, coarse joints")
     fine = most_stressed(folder / "coarse/history.npz", coupling.critical_joints)
+    if run.case.shock.duration == "auto" and run.case.shock.damping.acts:
+        fine = with_end(fine, folder / "coarse/history.npz")
     write_fine_joints(folder, fine)
     return fine
 
@@ -69,7 +73,7 @@ def run_mode(run: Run[BoardDropCase], folder: Path, mode: str, fine: FineJoints,
     request = _request(run, mode, (f"{prefix}assembly", f"{prefix}joints"), coupling)
     if not prefix and mode == next(name for name in MODES if name in run.case.shock.numerics.modes):
         request["shock"]["modes"] = run.case.shock.modes
-    request |= _end_of_first(run, folder.parent)
+    request |= _end_of_shock(run, folder.parent, fine)
     if mode == "two_scale" and needs_coarse_joints(coupling):
         request["coarse_joints"] = _mesh(run, f"{prefix}coarse_joints")
     request["checkpoints"] = str(run.checkpoints("shock").resolve() / folder.name)
@@ -77,13 +81,16 @@ def run_mode(run: Run[BoardDropCase], folder: Path, mode: str, fine: FineJoints,
     run_fem(run, folder, request, f"shock, {MODES[mode]}" + (f", {IDENTICAL_TITLE}" if prefix else ""))
 
 
-def _end_of_first(run: Run[BoardDropCase], folder: Path) -> dict:
-    """Return the input that ends a run of duration ``auto``: the first mode when it settles, others with it."""
+def _end_of_shock(run: Run[BoardDropCase], folder: Path, fine: FineJoints) -> dict:
+    """Return the input that ends a run of duration ``auto``.
+
+    The coarse run decides; without one, the first mode ends when it settles. Other modes end with the first.
+    """
     if run.case.shock.duration != "auto":
         return {}
     result = folder / run.case.shock.numerics.modes[0] / "result.json"
     if not result.exists():
-        return {"settles": True}
+        return {"settles": True} if fine.end is None else {"end": fine.end}
     model = read_json(result)["model"]
     return {"end": model["window"] * model["windows"]}
 

@@ -27,18 +27,21 @@ NOTE = (
 )
 
 
-def later_swings(shock: Shock, end: float) -> str:
-    """Return a note that later swings may be larger, for an undamped run that ended automatically at ``end`` [s].
+def later_swings(shock: Shock, end: float, why: str = "") -> str:
+    """Return a note on the end of a run of automatic duration: its reason, or that later swings may be larger.
 
     Args:
         shock: Parameters of the shock.
         end: Time at which the run ended [s].
+        why: Reason for the end, if a coarse run decided it.
 
     Returns:
-        Sentence with a leading space; empty if the duration is fixed or the board is damped.
+        Sentence with a leading space; empty if the duration is fixed, or the board is damped and no reason is given.
     """
-    if shock.duration != "auto" or any(shock.damping.coefficients):
+    if shock.duration != "auto":
         return ""
+    if shock.damping.acts:
+        return f" The run ends at {1e3 * end:.3g} ms: {why}." if why else ""
     return (
         f" The run ends at {1e3 * end:.3g} ms, half a swing after the largest stress. The board is undamped, so later"
         " swings may be larger; set shock.damping, or a longer shock.duration."

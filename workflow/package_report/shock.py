@@ -45,7 +45,7 @@ def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dic
     critical = metrics["critical_joint"]["value"]
     context["headline"] = tables.headline(metrics) + context["headline"]
     context["figures"] = headline(metrics, context["discretisation"], summary, results)
-    context["figures"]["note"] += later_swings(case.shock, float(histories[main]["time"][-1]))
+    context["figures"]["note"] += later_swings(case.shock, float(histories[main]["time"][-1]), _end(run_folder))
     context |= {"verdict": summary["verdict"], "answer": summary["answer"]}
     context["failing"] = failing(summary["verdict"])
     context["kinematics"] = kinematics_note(metrics, case.shock.numerics.kinematics)
@@ -145,6 +145,14 @@ def standoff_sentence(metrics: Mapping[str, Any]) -> str:
     """
     critical, identical = (micro(metrics[f"{name}_joint_standoff"]["value"]) for name in ("critical", "identical"))
     return f" Its standoff is {critical} µm; identical joints have {identical} µm."
+
+
+def _end(run_folder: Path) -> str:
+    """Return the reason for the end of the shock, if the coarse run decided it; else empty."""
+    from reflowshock.workflow.board_drop.fine_joints import read_fine_joints
+
+    fine = read_fine_joints(run_folder / "shock")
+    return fine.end_why if fine else ""
 
 
 def _add_interface(shock: Path, context: dict) -> None:

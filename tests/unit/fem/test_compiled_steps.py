@@ -13,7 +13,7 @@ from reflowshock.fem.dynamics.central_difference import ExplicitMotion
 from reflowshock.fem.dynamics.compiled_steps import CompiledSteps
 from reflowshock.fem.errors import InvertedElementError
 from reflowshock.fem.kernels.levels import Interface
-from reflowshock.fem.loads.damping import RayleighDamping
+from reflowshock.fem.loads.damping import RayleighDamping, WindowDrag
 from reflowshock.fem.loads.load import half_sine_drop
 from reflowshock.fem.model.assembly import ForceOptions, make_body, make_rank_elements
 from reflowshock.fem.parallel.local_mesh import distribute
@@ -109,6 +109,8 @@ def test_inverted_elements_raise_the_same_error():
 
 def test_what_acts_between_steps_is_no_matter_of_one_call():
     body = body_of(*SETTINGS["small"][:2])
-    assert CompiledSteps.of(body, [RayleighDamping.build(body, 1.0, 0.0)]) is None
+    damping = RayleighDamping.build(body, 1.0, 0.0)
+    assert CompiledSteps.of(body, [damping]) is None
+    assert CompiledSteps.of(body, WindowDrag.once_a_window([damping], STEPS)) is not None
     assert CompiledSteps.of(replace(body, terms=[*body.terms, SimpleNamespace(history={})]), []) is None
     assert CompiledSteps.of(replace(body, terms=[*body.terms, body.terms[0]]), []) is None

@@ -16,6 +16,7 @@ from tests.support.fem_bodies import STEEL, dense_stiffness
 
 GRAVITY = np.array([0.3, -2.0, 9.81])
 COEFFICIENTS = 0.7, 0.05  # c [1/s], dt/2 [s]
+FRAME = np.array([GRAVITY, [0.0, 0.2, -1.0]])  # body acceleration, and velocity of the table
 
 
 def random_nodes(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -37,9 +38,9 @@ def drag_of(velocity, mobility, gravity, coefficients, force) -> np.ndarray:
 def test_force_on_all_nodes(count):
     velocity, mobility, forces = random_nodes(count)
     others = forces[0] + forces[1]
-    drag = drag_of(velocity, mobility, GRAVITY, COEFFICIENTS, others)
+    drag = drag_of(velocity - FRAME[1], mobility, GRAVITY, COEFFICIENTS, others)
     expected = forces[0] + drag, others + drag
-    add_damping(velocity, mobility, GRAVITY, COEFFICIENTS, (forces[0], forces[1]))
+    add_damping(velocity, mobility, FRAME, COEFFICIENTS, (forces[0], forces[1]))
     assert np.allclose(forces, expected, rtol=1e-14, atol=1e-15)
 
 
@@ -47,10 +48,10 @@ def test_a_node_is_damped_alike_wherever_it_stands():
     """Copies of a node on several ranks stay bitwise equal, as in ``test_motion_kernels``."""
     velocity, mobility, forces = random_nodes(40)
     whole = forces.copy()
-    add_damping(velocity, mobility, GRAVITY, COEFFICIENTS, (whole[0], whole[1]))
+    add_damping(velocity, mobility, FRAME, COEFFICIENTS, (whole[0], whole[1]))
     for first in range(40):
         part = forces[:, first:].copy()
-        add_damping(velocity[first:].copy(), mobility[first:].copy(), GRAVITY, COEFFICIENTS, (part[0], part[1]))
+        add_damping(velocity[first:].copy(), mobility[first:].copy(), FRAME, COEFFICIENTS, (part[0], part[1]))
         assert np.array_equal(part, whole[:, first:])
 
 

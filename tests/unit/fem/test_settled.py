@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reflowshock.fem.output.settled import HISTORIES, half_oscillation, is_settled
+from reflowshock.fem.output.settled import HISTORIES, half_oscillation, is_settled, latest_swings, needed_end
 
 PERIOD = 4e-3
 
@@ -72,3 +72,25 @@ def test_without_joints_or_a_return_it_goes_on():
     bare |= {name: bare[name][:, :0] for name in HISTORIES[:4]}
     assert not is_settled(bare)
     assert not is_settled(history(PERIOD, swinging, deflection=lambda time: time))
+
+
+@pytest.mark.parametrize(("rate", "periods", "over"), [(200.0, 1.2, False), (200.0, 1.4, True), (30.0, 1.4, False)])
+def test_a_damped_board_is_over_when_two_swings_have_decayed(rate, periods, over):
+    """Stress peaks twice a period; two swings later it must be at most 0.9 of the largest."""
+
+    def decaying(time):
+        return 1e7 * np.abs(np.sin(2.0 * np.pi * time / PERIOD)) * np.exp(-rate * time)
+
+    shock = history(periods * PERIOD, decaying)
+    assert is_settled(shock, damped=True) is over
+    assert is_settled(shock)
+    assert needed_end(shock) == pytest.approx(0.75 * PERIOD, rel=0.1)
+
+
+def test_a_later_larger_swing_postpones_the_end():
+    def beating(time):
+        return 1e7 * np.abs(np.sin(2.0 * np.pi * time / PERIOD)) * (1.0 + 0.3 * (time > 0.5 * PERIOD))
+
+    shock = history(1.4 * PERIOD, beating)
+    assert not is_settled(shock, damped=True) and latest_swings(shock) == 1.0
+    assert needed_end(shock) == pytest.approx(1.25 * PERIOD, rel=0.05)

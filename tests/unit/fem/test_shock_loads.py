@@ -19,7 +19,7 @@ from reflowshock.fem.loads.shock_pulse import shock_pulse
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.problem import shock_checks
-from reflowshock.fem.problem.shock import Damping, Shock
+from reflowshock.fem.problem.shock import BoardDamping, Shock
 from tests.support.fem_bodies import STEEL
 
 G = 9.80665
@@ -60,12 +60,12 @@ PROBLEMS = {
     "shock.peak_acceleration": {"peak_acceleration": None, "pulse_duration": None},
     "shock.pulse_duration": {"pulse_duration": None},
     "shock.table": {"peak_acceleration": None, "pulse_duration": None, "service_condition": "B", "table": "a.csv"},
-    "shock.damping.frequency": {"damping": Damping(mass_ratio=0.01)},
+    "shock.damping.estimate": {"damping": BoardDamping(estimate="on", mass_coefficient=10.0)},
+    "shock.damping.frequency": {"damping": BoardDamping(mass_ratio=0.01)},
     "shock.numerics.kinematics": {
-        "damping": Damping(stiffness_coefficient=1e-9),
+        "damping": BoardDamping(stiffness_coefficient=1e-9),
         "numerics": {"kinematics": "finite"},
     },
-    "shock.method": {"method": "large_mass", "damping": Damping(mass_coefficient=10.0)},
 }
 
 
@@ -75,7 +75,7 @@ def test_what_does_not_fit_together_is_named(key):
 
 
 def test_possible_shock_has_no_problem():
-    assert not shock_checks.problems(shock(damping=Damping(stiffness_ratio=0.01, frequency=1e3)))
+    assert not shock_checks.problems(shock(damping=BoardDamping(stiffness_ratio=0.01, frequency=1e3)))
     with pytest.raises(ValidationError, match="service_condition"):
         shock(service_condition="J")
 

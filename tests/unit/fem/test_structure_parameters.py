@@ -106,10 +106,6 @@ def test_own_materials_go_before_those_of_the_library():
         ),
         ({"loads": {"drop": SHAKEN, "again": SHAKEN}}, "again.method = large_mass: is already the method of loads."),
         (
-            {"loads": {"drop": SHAKEN}, "dynamics": {"duration": 1e-3, "damping": {"mass_coefficient": 10.0}}},
-            "loads.drop.method = large_mass: cannot be combined with mass-proportional damping",
-        ),
-        (
             {"loads": {"drop": SHAKEN}, "dynamics": {"duration": 1e-3, "initial_velocity": [0.0, 0.0, 1.0]}},
             "loads.drop.method = large_mass: cannot be combined with initial_velocity",
         ),

@@ -38,7 +38,7 @@ SCENES = {
     "flexible": (HEATED, "thermal.effects.flexible=on", "thermal.effects.flexible=off"),
     "residual_stress": (HEATED, "thermal.effects.residual_stress=on", "thermal.effects.residual_stress=off"),
     "plasticity": (SMALL_CASE, "shock.numerics.plasticity=on", "shock.gravity=auto"),
-    "damping": (SMALL_CASE, "shock.damping.mass_coefficient=100 Hz", "shock.damping.mass_coefficient=0 Hz"),
+    "damping": (SMALL_CASE, "shock.damping.mass_coefficient=100 Hz", "shock.damping.estimate=off"),
     "one_way": (SMALL_CASE, "shock.coupling.direction=one_way", "shock.coupling.direction=two_way"),
     "finite_rotation": (SMALL_CASE, "shock.numerics.kinematics=finite", "shock.numerics.kinematics=small"),
     "gravity_in_the_shock": (SMALL_CASE, "shock.peak_acceleration=100 G", "shock.peak_acceleration=1500 G"),
