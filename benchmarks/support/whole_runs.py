@@ -25,7 +25,7 @@ def found_in_runs(folder: Path = RUNS) -> tuple[dict[str, dict], dict[str, str]]
         metrics = summary["metrics"]
         yields = "layer_plastic_work" in metrics
         if yields and metrics["elements_board"]["value"] >= elements:
-            bars[name] = turns.bar(sum(summary["timings"].values()), limit, False)
+            bars[name] = turns.bar(sum(summary["timings"]["wall"].values()), limit, False)
         else:
             missing[name] = COMMANDS[case]
     return bars, missing

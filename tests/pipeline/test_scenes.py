@@ -57,7 +57,7 @@ def test_from_case_file_to_report(tmp_path, name, setting, metrics):
     assert set(summary["metrics"]) >= ALWAYS | metrics
     assert all(check["ok"] for check in summary["health"].values())
     assert summary["metrics"]["verdict"]["value"] == "ok"
-    assert set(summary["timings"]) == {"reflow"}
+    assert set(summary["timings"]["wall"]) == {"reflow"}
     page = (tmp_path / "report.html").read_text()
     assert 'data-scene="0"' in page and 'data-figure="0"' in page
     assert not list(tmp_path.rglob("*.partial"))

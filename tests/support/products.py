@@ -41,7 +41,7 @@ def record_of(product: Path, **entries: object) -> None:
     """Seal a product with a record of some entries."""
     product.mkdir(parents=True, exist_ok=True)
     entries.pop("sha256", None)
-    seal(product, {"seconds": 1.0, "core_seconds": 1.0, "metrics": {}, "health": {}, "effects": {}} | entries)
+    seal(product, {"seconds": 1.0, "core_seconds": 1.0, "forecast": 2.0, "metrics": {}, "health": {}, "effects": {}} | entries)
 
 
 def shown_run(folder: Path) -> Store:

@@ -71,8 +71,8 @@ def _context(run_folder: Path, case: Case, summary: dict, errors: Discretisation
         "warnings": summary.get("warnings", []),
         "preview_caption": "Mesh of board and package, coloured by part. Joints are meshed after reflow.",
         "missed": [name.replace("_", " ") for name, check in summary["health"].items() if not check["ok"]],
-        "not_run": [name for name in case.pipeline.names[:-1] if name not in summary["timings"]],
-        "timings": summary["timings"],
+        "not_run": [name for name in case.pipeline.names[:-1] if name not in summary["timings"]["wall"]],
+        "timings": summary["timings"]["wall"],
         "curves": {},
         "scenes": {},
         "pictures": {},
@@ -93,7 +93,8 @@ def collect_summary(run_folder: Path, case: Case) -> dict:
         case: the resolved case.
 
     Returns:
-        The contents of ``summary.json``: case, version, inputs_sha256, metrics, timings [s], effects, health.
+        The contents of ``summary.json``: case, version, inputs_sha256, metrics, timings ("predicted" and "wall",
+        each by stage [s]), effects, health.
         Stages without a product contribute nothing.
     """
     summary: dict[str, Any] = {
@@ -101,7 +102,7 @@ def collect_summary(run_folder: Path, case: Case) -> dict:
         "version": __version__,
         "inputs_sha256": inputs_digest(case),
         "metrics": {},
-        "timings": {},
+        "timings": {"predicted": {}, "wall": {}},
         "effects": {},
         "health": {},
     }
@@ -109,7 +110,8 @@ def collect_summary(run_folder: Path, case: Case) -> dict:
         record = read_record(run_folder / stage)
         if record is None:
             continue
-        summary["timings"][stage] = record["seconds"]
+        summary["timings"]["wall"][stage] = record["seconds"]
+        summary["timings"]["predicted"][stage] = record["forecast"]
         for key in ("metrics", "health"):
             summary[key].update(record[key])
         for name, effect in record["effects"].items():  # e.g. gravity, which reflow and shock both have

@@ -68,7 +68,7 @@ def row_of(number: int, store: Store, point: Point, keys: Sequence[str], failure
         settings,
         UNHEALTHY if failed_checks else HEALTHY,
         "; ".join(failed_checks),
-        sum(summary["timings"].values()),
+        sum(summary["timings"]["wall"].values()),
         summary["metrics"],
     )
 

@@ -134,7 +134,8 @@ def test_summary_merges_the_stages_that_have_run(tmp_path):
         metrics = {stage: {"value": value, "unit": ""}}
         record_of(tmp_path / stage, seconds=1.5, metrics=metrics, effects={"gravity": stage})
     summary = collect_summary(tmp_path, case)
-    assert summary["timings"] == {"geometry": 1.5, "shock": 1.5}
+    assert summary["timings"]["wall"] == {"geometry": 1.5, "shock": 1.5}
+    assert summary["timings"]["predicted"] == {"geometry": 2.0, "shock": 2.0}
     assert set(summary["metrics"]) == {"geometry", "shock"}
     assert summary["effects"] == {"gravity": "geometry", "gravity_in_the_shock": "shock"}
     write_summary(tmp_path, summary)
