@@ -9,12 +9,12 @@ from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.convergence.accuracy_file import FILE, Accuracy, Measurement, read_accuracy
 from reflowshock.workflow.convergence.calibration import folder_name
 from reflowshock.workflow.convergence.errors import Error
+from reflowshock.workflow.convergence.grid_convergence import SAFETY, SAFETY_WITHOUT_ORDER
 from reflowshock.workflow.report.errors import Discretisation
 from reflowshock.workflow.store.keys import product_keys
 from reflowshock.workflow.store.store import HOME
 
 CASE_SIZE = 1.0  # element size relative to the case
-SAFETY, SAFETY_WITHOUT_ORDER = 1.25, 3.0  # Roache 1994: for three or more meshes, and for two
 STALE = "the case has changed since reflowshock accuracy was run; run it again"
 COARSEST = "reflowshock accuracy has not compared the mesh of the case with finer ones"
 

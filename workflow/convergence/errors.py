@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from reflowshock.workflow.convergence.convergence_study import Quantity, StudyRun, Values
+from reflowshock.workflow.convergence.grid_convergence import observed_order
 
 LARGEST_ORDER = 2.5  # plausible: no method here is of more than second order
 ORDER_MARGIN = 0.5  # largest difference between observed and theoretical order, else the runs are too coarse
@@ -130,16 +131,7 @@ def richardson(sizes: Sequence[float], values: Sequence[Values], order: float | 
     coarse, fine = (np.asarray(values[k]) - np.asarray(values[k + 1]) for k in (0, 1))
     if np.sum(coarse * fine) <= 0.0:
         return None  # the values oscillate
-    ratio = _norm(coarse) / _norm(fine)
-
-    def excess(power: float) -> float:
-        return (sizes[0] ** power - sizes[1] ** power) / (sizes[1] ** power - sizes[2] ** power) - ratio
-
-    if excess(ORDER_MARGIN) * excess(LARGEST_ORDER) > 0.0:
-        return None
-    from scipy.optimize import brentq  # deferred: reports and plans do not need SciPy
-
-    observed = float(brentq(excess, ORDER_MARGIN, LARGEST_ORDER))
-    if order is not None and abs(observed - order) > ORDER_MARGIN:
+    observed = observed_order(sizes, _norm(coarse) / _norm(fine), ORDER_MARGIN, LARGEST_ORDER)
+    if observed is None or (order is not None and abs(observed - order) > ORDER_MARGIN):
         return None
     return values[2] - fine / ((sizes[1] / sizes[2]) ** observed - 1.0), observed
