@@ -31,6 +31,7 @@ def conclude(run_folder: Path, case: BoardDropCase, summary: dict, known: Discre
     main = next(iter(histories))
     summary["effects"][Failing.name] = Failing.by_limits(case.shock.failure)
     coarse = _coarse(results[main], histories[main]["joints"])
+    summary["errors"] = known.record(results)
     verdict = verdict_of(case.shock.failure, histories[main], critical["value"], coarse)
     if PEEL in known.errors:
         summary["metrics"]["discretisation_error"] = metric(known.errors[PEEL])

@@ -6,7 +6,7 @@ Links and files of the program are listed in ``.store/views/<key of the folder>.
 import json
 import os
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,19 +27,26 @@ class Link:
     digest: str
 
 
-def show(store: Store, point: Point, stages: Iterable[str]) -> list[str]:
+Companions = Mapping[str, tuple[Point, Iterable[str]]]
+
+
+def show(store: Store, point: Point, stages: Iterable[str], companions: Companions | None = None) -> list[str]:
     """Link the products of some stages of a point into its run folder and remove all other links.
 
     Args:
         store: store of the products.
         point: point of the run folder.
         stages: stages whose products exist and are intact.
+        companions: folder in the run folder -> companion and its intact stages.
 
     Returns:
         Names of files that were missing or modified in the run folder and have been restored.
     """
     folder = store.run_folder(point)
     links = _wanted(store, point, set(stages))
+    for name, (companion, intact) in (companions or {}).items():
+        products = _wanted(store, companion, set(intact))
+        links |= {f"{name}/{path}": link for path, link in products.items() if "/" in path}
     before = listed(store, folder)
     _make_way(folder, CASE)
     write_case(folder, point.case)
