@@ -47,6 +47,7 @@ Force = Annotated[
     typer.Option("--force", help="use the folder even if it contains another case; accept implausible values"),
 ]
 Yes = Annotated[bool, typer.Option("--yes", "-y", help="do not ask before runs of more than an hour")]
+WITHOUT_ERRORS = "numerics.error.method=off"  # as an argument of --set
 MOST_AT_ONCE = 10_000  # cores, or jobs of a cluster
 AtOnce = Annotated[
     int | None,
@@ -115,6 +116,9 @@ def run(
         bool, typer.Option("--fail-on-verdict", help="exit code 3 if the verdict on the design is FAIL")
     ] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", "-n", help="show what would run and its cost, as plan")] = False,
+    no_error: Annotated[
+        bool, typer.Option("--no-error", help=f"estimate no discretisation errors (--set {WITHOUT_ERRORS})")
+    ] = False,
 ) -> None:
     """Run all stages that are missing, stale or damaged; ends with the verdict on the design.
 
@@ -127,6 +131,7 @@ def run(
     from reflowshock.workflow.run import WHAT, run_case
     from reflowshock.workflow.verdict.criterion import FAIL
 
+    settings = [*(settings or []), *([WITHOUT_ERRORS] if no_error else [])]
     store, point = _load(case, settings, out, oversubscribe or executor != ExecutorName.LOCAL, force)
     if until not in point.case.pipeline.names:
         allowed = ", ".join(point.case.pipeline.names)

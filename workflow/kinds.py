@@ -16,6 +16,7 @@ from reflowshock.particles.parameters.effects import LIQUID_EFFECTS
 from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import problems as package_checks
 from reflowshock.workflow.board_drop import stages as package_stages
+from reflowshock.workflow.board_drop.companions import companions
 from reflowshock.workflow.board_drop.forecast import (
     board_drop_size,
     forecast_board_drop,
@@ -27,7 +28,8 @@ from reflowshock.workflow.board_drop.shock_effects import SHOCK_EFFECTS
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.forecast import SECONDS_OF_REPORT, SECONDS_OF_STAGE, Size
 from reflowshock.workflow.case.problems import CaseError
-from reflowshock.workflow.case.run import StageFunction
+from reflowshock.workflow.case.run import Findings, Run, StageFunction
+from reflowshock.workflow.case.stage import ERRORS
 from reflowshock.workflow.convergence.convergence_study import ConvergenceStudy
 from reflowshock.workflow.flows.flow_kind import STAGE as FLOW_STAGE
 from reflowshock.workflow.flows.flow_kind import FlowCase, FlowKind
@@ -75,6 +77,7 @@ class Kind:
         report: Function that adds sections to the context of a report: run folder, case, context, summary.
         study: Convergence study of a case.
         effects: Effects that may act.
+        companions: Companions of a case by element size, from the product of its shock; None before the shock.
         conclude: Function that adds conclusions to a summary: run folder, case, summary, discretisation errors.
     """
 
@@ -88,6 +91,7 @@ class Kind:
     report: Callable[[Path, Any, dict, dict], None]
     study: Callable[[Any], ConvergenceStudy]
     effects: Sequence[Effect]
+    companions: Callable[[Any, Path | None], Mapping[float, Case]] = lambda case, shock: {}
     conclude: Callable[[Path, Any, dict, Discretisation], None] = lambda folder, case, summary, errors: None
 
     @property
@@ -119,6 +123,12 @@ def _conclude_structure(run_folder: Path, case: StructureCase, summary: dict, er
     from reflowshock.workflow.verdict.verdict import verdict_of_structure
 
     summary["verdict"] = verdict_of_structure()
+
+
+def _estimate_errors(run: Run, folder: Path) -> Findings:
+    from reflowshock.workflow.convergence.error_estimate import estimate_errors
+
+    return estimate_errors(run, folder)
 
 
 def _structure_report(run_folder: Path, case: StructureCase, context: dict, summary: dict) -> None:
@@ -232,7 +242,12 @@ BOARD_DROP = replace(
     PACKAGE,
     case=BoardDropCase,
     problems=package_checks.board_drop_problems,
-    stages={**PACKAGE.stages, "solder_mesh": package_stages.solder_mesh_for_drop, "shock": package_stages.shock},
+    stages={
+        **PACKAGE.stages,
+        "solder_mesh": package_stages.solder_mesh_for_drop,
+        "shock": package_stages.shock,
+        ERRORS.name: _estimate_errors,
+    },
     forecast=forecast_board_drop,
     size=board_drop_size,
     plan=board_drop_tables,
@@ -240,6 +255,7 @@ BOARD_DROP = replace(
     report=_board_drop_report,
     study=_board_drop_study,
     effects=(*PACKAGE.effects, *SHOCK_EFFECTS),
+    companions=companions,
     conclude=_conclude_drop,
 )
 STRUCTURE = Kind(

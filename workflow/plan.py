@@ -1,6 +1,6 @@
 """Plan of a run: stages to run, reasons and predicted cost, without running or writing anything."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -9,12 +9,15 @@ from rich.table import Table
 
 from reflowshock.workflow.case.case import FULL, Case
 from reflowshock.workflow.case.fields import display, leaves
+from reflowshock.workflow.case.stage import ERRORS
 from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.effects.page import effects_table
 from reflowshock.workflow.kinds import every_stage, kind_of, stage_seconds
+from reflowshock.workflow.pipeline.companions import at_once, companion_seconds
 from reflowshock.workflow.pipeline.gate import LONG
 from reflowshock.workflow.process.kernel_folder import compilation_time
 from reflowshock.workflow.process.terminal import new_table, style_text
+from reflowshock.workflow.store.companions import companion_name
 from reflowshock.workflow.store.keys import Change
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.state import StageState, examine, why_stale
@@ -48,25 +51,28 @@ def planned_stages(store: Store, point: Point) -> dict[str, PlannedStage]:
 
 
 def plan_record(store: Store, point: Point) -> dict[str, Any]:
-    """Return a plan as JSON data: stages, effects as in ``summary.json``, wall times of compilation and total [s].
+    """Return a plan as JSON data: stages, effects as in ``summary.json``, and wall times [s].
 
     Args:
         store: Store of the run folder, whose files are examined.
         point: Point of the run.
 
     Returns:
-        ``case`` (name), ``folder``, ``stages`` (``runs``, ``why``, ``seconds`` by name), ``effects``, ``compilation``
-        [s] and ``seconds`` of all.
+        ``case`` (name), ``folder``, ``stages`` (``runs``, ``why``, ``seconds`` by name), ``effects``, ``companions``
+        of a drop, ``compilation`` [s] and ``seconds`` of all.
     """
     stages = planned_stages(store, point)
     once = compilation_time([name for name, stage in stages.items() if stage.runs])
+    companions = _companions(store, point, [name for name, stage in stages.items() if stage.runs])
+    once_and_companions = once + at_once(companions.values())
     return {
         "case": point.case.case.name,
         "folder": str(store.folder),
         "stages": {name: asdict(stage) for name, stage in stages.items()},
+        "companions": {companion_name(size): seconds for size, seconds in companions.items()},
         "effects": dict(kind_of(point.case).forecast(point.case).effects),
         "compilation": once,
-        "seconds": once + sum(stage.seconds or 0.0 for stage in stages.values() if stage.runs),
+        "seconds": once_and_companions + sum(stage.seconds or 0.0 for stage in stages.values() if stage.runs),
     }
 
 
@@ -139,7 +145,13 @@ def predicted_seconds(store: Store, point: Point, until: str) -> float:
     """
     states, costs = examine(store, point), predicted_costs(store, point.case, stage_seconds(point.case))
     stale = [stage.name for stage in point.case.pipeline.upstream(until) if states[stage.name].stale]
-    return sum(costs[name].seconds for name in stale) + compilation_time(stale)
+    companions = at_once(_companions(store, point, stale).values())
+    return sum(costs[name].seconds for name in stale) + companions + compilation_time(stale)
+
+
+def _companions(store: Store, point: Point, stale: Sequence[str]) -> dict[float, float]:
+    """Predict the wall time of each companion that runs [s], if the stage that reads them is among stale stages."""
+    return companion_seconds(store, point) if ERRORS.name in stale else {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,13 +192,18 @@ def predicted_costs(store: Store, case: Case, seconds: Mapping[str, float]) -> d
 def _stages(store: Store, point: Point, seconds: Mapping[str, float]) -> Table:
     table = new_table(f"Stages, in {store.folder}", "stage", "", "cost", "why")
     states, costs = examine(store, point), predicted_costs(store, point.case, seconds)
+    companions = _companions(store, point, [name for name, state in states.items() if state.stale])
     for name, state in states.items():
+        if name == ERRORS.name and companions:
+            sizes = " and ".join(f"{size:g}" for size in companions)
+            cost = f"about {duration(at_once(companions.values()))}"
+            table.add_row("companions", style_text("[yellow]run[/]"), cost, f"elements x {sizes}, at once")
         mark = style_text("[yellow]run[/]" if state.stale else "[green]skip[/]")
         table.add_row(name, mark, str(costs[name]) if state.stale else "", reason(state, point.case))
     if once := compilation_time([name for name, state in states.items() if state.stale]):
         table.add_row("kernels", "", f"about {duration(once)}", "compiled once, in these stages")
     stale = [costs[name] for name, state in states.items() if state.stale]
-    left = sum(cost.seconds for cost in stale) + once
+    left = sum(cost.seconds for cost in stale) + at_once(companions.values()) + once
     remark = _about_time(left)
     if any(cost.source == FORMER for cost in stale):
         remark += f"; {FORMER}: corrected by former runs here"

@@ -1,9 +1,9 @@
 """Stage functions of each kind of case.
 
-Package on a board: geometry -> reflow -> surface -> solder_mesh -> shock -> report (`board_drop/stages.py`,
-`reflow/stage.py`), the shock is optional. Structure: geometry -> shock -> comparison -> report
-(`structure/stages.py`). Solder alone: reflow -> report (`solder/stages.py`). Flow: particles -> report
-(`flows/stage.py`).
+Package on a board: geometry -> reflow -> surface -> solder_mesh -> shock -> errors -> report (`board_drop/stages.py`,
+`reflow/stage.py`, `convergence/error_estimate.py`), the shock and its errors are optional. Structure: geometry -> shock
+-> comparison -> report (`structure/stages.py`). Solder alone: reflow -> report (`solder/stages.py`). Flow: particles ->
+report (`flows/stage.py`).
 
 Each stage reads products of earlier stages from ``run.folder``, writes its own into ``folder``, and returns findings.
 Packages are imported inside the functions, so that a stage loads only the packages that it needs.

@@ -8,9 +8,12 @@ from rich.table import Table
 from rich.text import Text
 
 from reflowshock.units import from_si
+from reflowshock.workflow.case.stage import ERRORS
 from reflowshock.workflow.case.text import duration
+from reflowshock.workflow.pipeline.companions import companion_points
 from reflowshock.workflow.process.progress_file import read_progress
 from reflowshock.workflow.process.terminal import style_text
+from reflowshock.workflow.store.companions import UNTIL
 from reflowshock.workflow.store.folders import is_busy
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.state import StageState, examine
@@ -37,6 +40,7 @@ FIGURES = {
         "displacement_difference", "strain_difference", "wave_speed_error", "transmitted_velocity_error",
         "reflected_velocity_error", "tip_deflection_error", "swing_frequency_error",
     ),
+    "errors": ("companion_cost_share",),
     "report": (),
 }  # fmt: skip
 
@@ -56,12 +60,20 @@ def follow_run(store: Store, point: Point, console: Console) -> None:
     with Live(console=console, transient=True, auto_refresh=False) as live:
         while is_busy(store.folder):
             lines = [line for stage in point.digests if (line := _progress(store, point, stage))]
+            lines += _companion_progress(store, point)
             live.update(Text("\n".join(lines) or "waiting for the next stage …"), refresh=True)
             begun = ", ".join(line.partition(":")[0] for line in lines)
             if not console.is_terminal and begun and begun != printed:
                 printed = begun
                 console.print("\n".join(lines))
             time.sleep(LOOK)
+
+
+def _companion_progress(store: Store, point: Point) -> list[str]:
+    """Return the progress of the shock of each companion as text, empty if it is not running."""
+    companions = companion_points(store, point).items()
+    lines = {size: _progress(store, companion, UNTIL) for size, companion in companions}
+    return [f"elements x {size:g}, {line}" for size, line in lines.items() if line]
 
 
 def _progress(store: Store, point: Point, stage: str) -> str:
@@ -87,11 +99,25 @@ def show_status(store: Store, point: Point, console: Console) -> None:
     table.add_column("time", justify="right", no_wrap=True)
     table.add_column("figures", ratio=1)
     for name, state in examine(store, point).items():
-        record = store.record(point, name) or {"metrics": {}, "health": {}}
-        seconds = f"{record['seconds']:.1f} s" if "seconds" in record else ""
-        figures = ", ".join(state.damaged) or _figures(name, record["metrics"])
-        table.add_row(name, _state(state, record["health"]), seconds, figures)
+        if name == ERRORS.name:
+            _add_companions(table, store, point)
+        _add_row(table, store.record(point, name), name, name, state)
     console.print(table)
+
+
+def _add_companions(table: Table, store: Store, point: Point) -> None:
+    """Add a row for the shock of each companion."""
+    for size, companion in companion_points(store, point).items():
+        state = examine(store, companion)[UNTIL]
+        _add_row(table, store.record(companion, UNTIL), f"{UNTIL}, elements x {size:g}", UNTIL, state)
+
+
+def _add_row(table: Table, record: dict | None, title: str, stage: str, state: StageState) -> None:
+    """Add the row of a stage from its record, which may be missing."""
+    known = record or {"metrics": {}, "health": {}}
+    seconds = f"{known['seconds']:.1f} s" if "seconds" in known else ""
+    figures = ", ".join(state.damaged) or _figures(stage, known["metrics"])
+    table.add_row(title, _state(state, known["health"]), seconds, figures)
 
 
 def metric_text(metric: dict) -> str:

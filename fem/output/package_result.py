@@ -18,13 +18,11 @@ from reflowshock.fem.output.acceleration import drop_accelerations, peaks_of
 from reflowshock.fem.output.point_metrics import gauge_lengths, gauge_metrics, mode_metrics, point_metrics
 from reflowshock.fem.output.ranking import (
     ENDS,
-    OUTER_FIBRE,
     PEEL,
-    PLASTIC_STRAIN,
     PLASTIC_WORK,
     VON_MISES,
-    Measure,
     critical_joint,
+    joint_figures,
     ranking_measure,
 )
 from reflowshock.fem.output.response_spectrum import response_spectrum
@@ -140,20 +138,12 @@ def _shock_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
 def _joint_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
     """Return peaks over time of the critical joint's worse pad and of all joints, mesh-dependent ones last."""
     critical = critical_joint(arrays)
-    sections = np.stack([arrays[f"section_{end}"][:, critical] for end in ENDS])
     layer = VON_MISES.worse(arrays)
     start = float(layer[0, critical])
     values = {
         "critical_joint": quantity(str(arrays["joints"][critical])),
         "critical_end": quantity(ranking_measure(arrays).worse_end(arrays, critical)),
-        "peel_stress": quantity(float(PEEL.peaks(arrays)[critical]), "Pa"),
-        "layer_von_mises": quantity(float(layer[:, critical].max()), "Pa"),
-        **{name: quantity(float(item.peaks(arrays)[critical]), item.unit) for name, item in _flows(arrays).items()},
-        "section_axial_force": quantity(float(sections[..., 0].max()), "N"),
-        "section_shear_force": quantity(float(np.hypot(sections[..., 1], sections[..., 2]).max()), "N"),
-        "section_torsion_moment": quantity(float(np.abs(sections[..., 3]).max()), "N m"),
-        "section_bending_moment": quantity(float(np.hypot(sections[..., 4], sections[..., 5]).max()), "N m"),
-        "outer_fibre_stress": quantity(float(OUTER_FIBRE.peaks(arrays)[critical]), "Pa"),
+        **{name: quantity(*figure) for name, figure in joint_figures(arrays, critical).items()},
         "joint_layer": quantity(float(arrays["joint_layer"]), "m"),
         "peak_peel_stress": quantity(float(PEEL.peaks(arrays).max()), "Pa"),
         "peak_von_mises": quantity(float(layer.max()), "Pa"),
@@ -161,11 +151,6 @@ def _joint_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
         "peak_element_stress": quantity(float(arrays["von_mises_max"].max()), "Pa"),
     }
     return values | _flow_metrics(arrays)
-
-
-def _flows(arrays: Mapping[str, NDArray]) -> dict[str, Measure]:
-    """Return the measures of plastic flow in the layer by metric name; empty if solder does not yield."""
-    return {"layer_plastic_strain": PLASTIC_STRAIN, "layer_plastic_work": PLASTIC_WORK} if _has_flow(arrays) else {}
 
 
 def _has_flow(arrays: Mapping[str, NDArray]) -> bool:

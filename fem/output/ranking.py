@@ -46,6 +46,26 @@ VON_MISES = Measure("von_mises", "von Mises stress of the layer", "Pa")
 PLASTIC_STRAIN = Measure("plastic_strain", "plastic strain of the layer", "")
 PLASTIC_WORK = Measure("plastic_work", "plastic work density of the layer", "J/m^3")
 OUTER_FIBRE = Measure("outer_fibre", "outer-fibre stress", "Pa")
+PLASTIC_FLOW = {"layer_plastic_strain": PLASTIC_STRAIN, "layer_plastic_work": PLASTIC_WORK}  # if solder yields
+
+
+def joint_figures(arrays: Arrays, joint: int) -> dict[str, tuple[float, str]]:
+    """Return the peaks over time on the worse pad of a joint: name -> value and SI unit.
+
+    Args:
+        arrays: Histories of a shock.
+        joint: Number of the joint.
+    """
+    sections = np.stack([arrays[f"section_{end}"][:, joint] for end in ENDS])
+    flows = PLASTIC_FLOW if "plastic_strain_max" in arrays else {}
+    measures = {"peel_stress": PEEL, "layer_von_mises": VON_MISES, **flows, "outer_fibre_stress": OUTER_FIBRE}
+    forces = {
+        "section_axial_force": (float(sections[..., 0].max()), "N"),
+        "section_shear_force": (float(np.hypot(sections[..., 1], sections[..., 2]).max()), "N"),
+        "section_torsion_moment": (float(np.abs(sections[..., 3]).max()), "N m"),
+        "section_bending_moment": (float(np.hypot(sections[..., 4], sections[..., 5]).max()), "N m"),
+    }
+    return {name: (float(item.peaks(arrays)[joint]), item.unit) for name, item in measures.items()} | forces
 
 
 def ranking_measure(arrays: Arrays) -> Measure:

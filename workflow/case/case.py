@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import ClassVar, Self
 
 from reflowshock.parameters import Parameters
+from reflowshock.workflow.case.error_settings import Method
 from reflowshock.workflow.case.names import Name
 from reflowshock.workflow.case.stage import Pipeline
 
@@ -45,6 +46,11 @@ class Case(Parameters):
     def pipeline(self) -> Pipeline:
         """Pipeline of this case."""
         return self.stages
+
+    @property
+    def error_method(self) -> Method:
+        """Origin of the discretisation errors of a run."""
+        return "measured"
 
     @property
     def ranks(self) -> int:

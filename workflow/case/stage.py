@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 PAGE = ("report.html", "summary.json")
+ERROR_METHOD = "numerics.error.method"
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +69,10 @@ class Pipeline:
         for stage in reversed(self.upstream(name)[:-1]):
             upstream |= set(stage.follows) if stage.name in upstream else set()
         return tuple(stage_name for stage_name in self.names if stage_name in upstream)
+
+
+# Errors of the shock, estimated from companions on coarser meshes: workflow/convergence/error_estimate.py
+ERRORS = Stage("errors", (ERROR_METHOD,), ("shock",), ("errors/errors.json",))
 
 
 def report_of(*follows: str, parameters: tuple[str, ...] = ()) -> Stage:

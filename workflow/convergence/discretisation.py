@@ -1,4 +1,4 @@
-"""Discretisation errors of a run, from the convergence study of its case.
+"""Discretisation errors of a run, from its companions on coarser meshes or from the convergence study of its case.
 
 The reported error is the grid convergence index of Roache, J. Fluids Eng. 116 (1994) 405.
 """
@@ -6,15 +6,21 @@ The reported error is the grid convergence index of Roache, J. Fluids Eng. 116 (
 from pathlib import Path
 
 from reflowshock.workflow.case.case import Case
+from reflowshock.workflow.case.stage import ERRORS
 from reflowshock.workflow.convergence.accuracy_file import FILE, Accuracy, Measurement, read_accuracy
 from reflowshock.workflow.convergence.calibration import folder_name
+from reflowshock.workflow.convergence.error_estimate import FILE as ESTIMATED
 from reflowshock.workflow.convergence.errors import Error
 from reflowshock.workflow.convergence.grid_convergence import SAFETY, SAFETY_WITHOUT_ORDER
+from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.report.errors import Discretisation
 from reflowshock.workflow.store.keys import product_keys
 from reflowshock.workflow.store.store import HOME
 
 CASE_SIZE = 1.0  # element size relative to the case
+OFF = "numerics.error.method is off"
+NOT_RUN = "stage errors has not run"
+HEATED = "with [thermal] each coarser mesh would repeat the reflow; reflowshock accuracy measures it"
 STALE = "the case has changed since reflowshock accuracy was run; run it again"
 COARSEST = "reflowshock accuracy has not compared the mesh of the case with finer ones"
 
@@ -47,15 +53,37 @@ def discretisation(run_folder: Path, case: Case) -> Discretisation:
     """Return the discretisation errors of a run: grid convergence indices of the mesh of its case.
 
     Args:
-        run_folder: Run folder; the study is searched next to it.
+        run_folder: Run folder; a study is searched next to it.
         case: Case of the run.
 
     Returns:
         Relative error of each metric by name, its origin in words, and why others are unknown; empty without a study.
     """
+    if case.error_method == "off":
+        return Discretisation(unknown=OFF)
+    if ERRORS in case.pipeline.stages:
+        return _estimated(run_folder / ERRORS.name / ESTIMATED)
+    return _measured(run_folder, case)
+
+
+def _estimated(path: Path) -> Discretisation:
+    """Read the errors that the stage errors has estimated."""
+    if not path.is_file():
+        return Discretisation(unknown=NOT_RUN)
+    figures = read_json(path)
+    return Discretisation(
+        {name: error["discretisation"] for name, error in figures.items() if error["discretisation"] is not None},
+        {name: error["how"] for name, error in figures.items()},
+        "companions do not estimate it",
+        {name: error["order"] for name, error in figures.items() if error["order"] is not None},
+    )
+
+
+def _measured(run_folder: Path, case: Case) -> Discretisation:
+    """Return the errors from the convergence study of a case."""
     accuracy = read_case_accuracy(run_folder, case)
     if accuracy is None:
-        return Discretisation()
+        return Discretisation(unknown=HEATED) if case.error_method == "estimate" else Discretisation()
     if not is_current(accuracy, case):
         return Discretisation(unknown=STALE)
     run = _run_of_case(accuracy)
@@ -64,6 +92,7 @@ def discretisation(run_folder: Path, case: Case) -> Discretisation:
         {name: grid_convergence_index(error) for name, error in errors.items()},
         {name: error.against for name, error in errors.items()},
         "reflowshock accuracy does not measure it" if errors else COARSEST,
+        {name: error.order for name, error in errors.items() if error.order is not None},
     )
 
 

@@ -78,9 +78,7 @@ def observed_order(sizes: Sequence[float], ratio: float, least: float, largest: 
 
 def _index_without_order(sizes: Sequence[float], values: Sequence[float]) -> float:
     """Return the larger grid convergence index of the two pairs of meshes that contain the finest one."""
-    errors = (
-        abs(values[k] - values[2]) / ((sizes[k] / sizes[2]) ** THEORETICAL_ORDER - 1.0) for k in range(2)
-    )
+    errors = (abs(values[k] - values[2]) / ((sizes[k] / sizes[2]) ** THEORETICAL_ORDER - 1.0) for k in range(2))
     return SAFETY_WITHOUT_ORDER * max(errors)
 
 

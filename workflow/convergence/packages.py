@@ -8,6 +8,7 @@ from typing import Any
 
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.units import from_si
+from reflowshock.workflow.board_drop.companions import rounded_count
 from reflowshock.workflow.board_drop.duration import longest_duration
 from reflowshock.workflow.board_drop.shock_forecast import implicit_seconds
 from reflowshock.workflow.board_drop.shock_launch import MODES
@@ -197,15 +198,15 @@ def _sized(parameter: str, word: str, sizes: tuple[float, ...], settings: Callab
 def _board_elements(case: BoardDropCase, size: float) -> dict[str, str]:
     """Return settings that multiply the element size of board, substrate and die by ``size``."""
     board, package = case.board.numerics, case.package
-    layers = _count(board.layers, size)
+    layers = rounded_count(board.layers, size)
     return {
         "board.numerics.element_size": _length(size * board.element_size),
         "board.numerics.coarse_size": _length(size * board.coarse_size),
         "board.numerics.layers": f"{layers}",
         "board.numerics.patch_layers": f"{max(1, round(layers * board.patch_layers / board.layers))}",
         "package.numerics.element_size": _length(size * package.numerics.element_size),
-        "package.substrate.elements": f"{_count(package.substrate.elements, size)}",
-        "package.die.elements": f"{_count(package.die.elements, size)}",
+        "package.substrate.elements": f"{rounded_count(package.substrate.elements, size)}",
+        "package.die.elements": f"{rounded_count(package.die.elements, size)}",
     }
 
 
@@ -213,14 +214,14 @@ def _joint_elements(case: BoardDropCase, size: float) -> dict[str, str]:
     """Return settings that multiply the element size of fine joints by ``size``."""
     numerics, key = case.package.joint_numerics, "package.joint_numerics"
     settings = {
-        f"{key}.core": f"{_count(numerics.core, size)}",
-        f"{key}.rings": f"{_count(numerics.rings, size)}" if numerics.rings else "0",
-        f"{key}.layers": f"{max(2, _count(numerics.layers, size))}",
+        f"{key}.core": f"{rounded_count(numerics.core, size)}",
+        f"{key}.rings": f"{rounded_count(numerics.rings, size)}" if numerics.rings else "0",
+        f"{key}.layers": f"{max(2, rounded_count(numerics.layers, size))}",
     }
     if numerics.copper_layers > 1:
-        settings |= {f"{key}.copper_layers": f"{_count(numerics.copper_layers, size)}"}
+        settings |= {f"{key}.copper_layers": f"{rounded_count(numerics.copper_layers, size)}"}
     if numerics.pad_layer is not None:
-        settings |= {f"{key}.pad_layers": f"{_count(numerics.pad_layers, size)}"}
+        settings |= {f"{key}.pad_layers": f"{rounded_count(numerics.pad_layers, size)}"}
     scaled = case.shock.numerics.mass_scaled_step
     if scaled is not None:  # keeps the added share of mass; at a fixed step it would grow with refinement
         settings |= {"shock.numerics.mass_scaled_step": from_si(size * scaled, "ns", digits=4)}
@@ -233,14 +234,10 @@ def _column_elements(case: BoardDropCase, size: float) -> dict[str, str]:
     if imprint is None:
         return {}
     return {
-        f"{key}.rings": f"{_count(imprint.rings, size)}",
+        f"{key}.rings": f"{rounded_count(imprint.rings, size)}",
         f"{key}.first_layer": _length(size * imprint.first_layer),
         f"{key}.growth": f"{1.0 + size * (imprint.growth - 1.0):.4g}",
     }
-
-
-def _count(elements: int, size: float) -> int:
-    return max(1, floor(elements / size + 0.5))
 
 
 def _length(value: float) -> str:

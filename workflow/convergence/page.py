@@ -35,13 +35,12 @@ def write_pages(folder: Path, accuracy: Accuracy, remarks: tuple[str, ...] = ())
     (folder / TEXT).write_text(markdown(accuracy), encoding="utf-8")
 
 
-def section(accuracy: Accuracy, remarks: tuple[str, ...] = (), *, elsewhere: bool = False, stale: bool = False) -> dict:
+def section(accuracy: Accuracy, remarks: tuple[str, ...] = (), *, stale: bool = False) -> dict:
     """Return the values of the template's variables for a study's section: tables, charts, texts and flags by name.
 
     Args:
         accuracy: Convergence study.
         remarks: Further notes, one sentence each.
-        elsewhere: Whether the study belongs to another case than the page.
         stale: Whether the case has changed since the study was run.
     """
     chosen = accuracy.recommended
@@ -68,7 +67,6 @@ def section(accuracy: Accuracy, remarks: tuple[str, ...] = (), *, elsewhere: boo
         "orders": tables.orders(accuracy),
         "prediction": tables.prediction(accuracy),
         "remarks": remarks,
-        "elsewhere": elsewhere,
         "stale": stale,
     }
 
@@ -81,17 +79,14 @@ def section_for(run_folder: Path, case: Case) -> dict | None:
         case: Case of the run.
 
     Returns:
-        Values of the template's variables by name, for the study of the case, else of a shipped case of the same kind;
-        None without either.
+        Values of the template's variables by name, for the study of the case next to the run, else for the shipped
+        study of the same case; None without either.
     """
     accuracy = read_case_accuracy(run_folder, case)
     if accuracy is not None:
         return section(accuracy, stale=not is_current(accuracy, case))
-    for path in sorted(CASES.glob(f"*/{FILE}")):
-        accuracy = read_accuracy(path)
-        if accuracy is not None and accuracy.kind == case.kind:
-            return section(accuracy, elsewhere=accuracy.case != case.case.name)
-    return None
+    accuracy = read_accuracy(CASES / case.case.name / FILE)
+    return section(accuracy) if accuracy is not None and accuracy.kind == case.kind else None
 
 
 def markdown(accuracy: Accuracy) -> str:

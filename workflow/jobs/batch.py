@@ -2,13 +2,17 @@
 
 import json
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from reflowshock.workflow.case.stage import ERRORS
 from reflowshock.workflow.jobs.engine import SNAKEMAKE_LOG, JobOutput, failures_of, last_lines, snakemake
 from reflowshock.workflow.jobs.executor import Executor, Jobs, Local, Slurm
+from reflowshock.workflow.pipeline.companions import companion_points
+from reflowshock.workflow.process.terminal import console
+from reflowshock.workflow.store.companions import UNTIL, companion_name, link_companions
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import discard
 from reflowshock.workflow.store.state import StageState, examine, why_stale
@@ -71,11 +75,13 @@ class Job:
         stage: Stage that makes the product.
         point: First point that needs the product.
         needs: Names of the jobs whose products the stage reads.
+        is_of_companion: Whether the point is a companion, which runs at the same time as the others.
     """
 
     stage: str
     point: Point
     needs: tuple[str, ...]
+    is_of_companion: bool = False
 
     @property
     def name(self) -> str:
@@ -103,34 +109,69 @@ def job_name(point: Point, stage: str) -> str:
     return f"{stage}-{point.digests[stage]}"
 
 
-def list_missing(store: Store, points: Sequence[Point], until: str) -> list[Job]:
-    """List the jobs for missing, stale or damaged products of points, without duplicates, in the order of the stages.
+def list_missing(store: Store, points: Sequence[Point], until: str, tried: Collection[str] = ()) -> list[Job]:
+    """List the jobs for products of points that can be made now, without duplicates, in the order of the stages.
+
+    A product is made if it is missing, stale or damaged. Errors are estimated in three steps: the shock decides the
+    companions, these run, then the stage errors reads them.
 
     Args:
         store: Store of the products, which is examined.
         points: Points of the run or study.
         until: Last stage to make.
+        tried: Names of jobs that have been tried; a companion whose job has failed is not tried again.
     """
     jobs: dict[str, Job] = {}
     for point in points:
-        before: list[str] = []
-        states = examine(store, point)
-        for stage in point.case.pipeline.upstream(until):
-            if states[stage.name].stale:
-                name = job_name(point, stage.name)
-                jobs.setdefault(name, Job(stage.name, point, tuple(before)))
-                before.append(name)
+        for job in _next_jobs(store, point, until, tried):
+            jobs.setdefault(job.name, job)
     return list(jobs.values())
 
 
-def show_products(store: Store, point: Point) -> list[str]:
-    """Link all intact, current products into the run folder of a point.
-
-    Returns:
-        Names of files of the run folder that were missing or modified and have been restored.
-    """
+def _next_jobs(store: Store, point: Point, until: str, tried: Collection[str]) -> Iterator[Job]:
     states = examine(store, point)
-    return show(store, point, [name for name, state in states.items() if not (state.stale or state.because_of)])
+    stages = [stage.name for stage in point.case.pipeline.upstream(until) if states[stage.name].stale]
+    if ERRORS.name not in stages:
+        yield from _jobs(point, stages)
+    elif states[UNTIL].stale:
+        yield from _jobs(point, stages[: stages.index(ERRORS.name)])
+    else:
+        waiting = [job for other in companion_points(store, point).values() for job in _companion_jobs(store, other)]
+        yield from _untried(waiting, tried) or _jobs(point, stages)
+
+
+def _companion_jobs(store: Store, companion: Point) -> list[Job]:
+    """Return the jobs of the missing products of a companion."""
+    states = examine(store, companion)
+    stages = [stage.name for stage in companion.case.pipeline.upstream(UNTIL) if states[stage.name].stale]
+    return _jobs(companion, stages, is_of_companion=True)
+
+
+def _jobs(point: Point, stages: Sequence[str], *, is_of_companion: bool = False) -> list[Job]:
+    """Return the jobs of some stages, each of which needs those before it."""
+    names = [job_name(point, stage) for stage in stages]
+    return [Job(stage, point, tuple(names[:k]), is_of_companion) for k, stage in enumerate(stages)]
+
+
+def show_products(store: Store, point: Point) -> list[str]:
+    """Link all intact, current products of a point and its companions into its run folder; return restored files."""
+    companions = {
+        companion_name(size): (companion, _current(store, companion))
+        for size, companion in companion_points(store, point).items()
+    }
+    return show(store, point, _current(store, point), companions)
+
+
+def _current(store: Store, point: Point) -> list[str]:
+    """Return the stages whose products are intact and current."""
+    return [name for name, state in examine(store, point).items() if not (state.stale or state.because_of)]
+
+
+def prepare(store: Store, job: Job) -> None:
+    """Create the work folder of a job with links to the products that its stage reads."""
+    store.prepare_work(job.point, job.stage)
+    if job.stage == ERRORS.name:
+        link_companions(store, store.work_folder(job.point, job.stage), companion_points(store, job.point))
 
 
 def run_points(
@@ -160,19 +201,20 @@ def run_points(
     """
     tried: set[str] = set()
     try:
-        while True:
-            jobs = list_missing(store, points, until)
-            if not jobs or any(job.name in tried for job in jobs):
-                break
+        while jobs := _untried(list_missing(store, points, until, tried), tried):
             tried |= {job.name for job in jobs}
             for point in points:
                 show_products(store, point)
-            if not _run(store, jobs, machine, lock):
-                break
+            _run(store, jobs, machine, lock)
     finally:
         for point in points:
             show_products(store, point)
     return {point.key: reason for point in points if (reason := failure_message(store, point, until))}
+
+
+def _untried(jobs: Sequence[Job], tried: Collection[str]) -> list[Job]:
+    """Return the jobs that have not been tried and do not need one that has been tried in vain."""
+    return [job for job in jobs if job.name not in tried and not any(name in tried for name in job.needs)]
 
 
 def failure_message(store: Store, point: Point, until: str) -> str:
@@ -226,19 +268,21 @@ def _describe_silent_end(store: Store, point: Point, stage: str, state: StageSta
     return f"ended without an error message (it may have been killed){last}; see {log}"
 
 
-def _run(store: Store, jobs: Sequence[Job], machine: Machine, lock: int) -> bool:
+def _run(store: Store, jobs: Sequence[Job], machine: Machine, lock: int) -> None:
     """Run Snakemake once for some jobs; output of cluster jobs is shown as it arrives."""
     discard(store.home / BATCH)
     (store.home / BATCH / "logs").mkdir(parents=True)
     for job in jobs:
-        store.prepare_work(job.point, job.stage)
+        prepare(store, job)
     write_jobs(store, jobs, machine)
+    if machine.live and any(job.is_of_companion for job in jobs):
+        console.print("the same drop with larger elements, for its errors …")
     follow = machine.each_second
     if machine.live and machine.slurm:
         follow = JobOutput([log_of(store, job.point, job.stage) for job in jobs]).show
     config = ("--config", f"oversubscribe={int(machine.oversubscribe)}", f"cluster={int(bool(machine.slurm))}")
     try:
-        return snakemake(store.home.resolve(), machine.executor, ["--scheduler", "greedy", *config], lock, follow)
+        snakemake(store.home.resolve(), machine.executor, ["--scheduler", "greedy", *config], lock, follow)
     finally:
         for job in jobs:
             store.drop_work(job.point, job.stage)
@@ -257,7 +301,7 @@ def write_jobs(store: Store, jobs: Sequence[Job], machine: Machine) -> None:
             needs=job.needs,
             threads=_threads(job, jobs, machine, resources[job.point.key]),
             priority=job.point.case.pipeline.names.index(job.stage),
-            live=machine.live and not machine.slurm,
+            live=machine.live and not machine.slurm and not job.is_of_companion,
             resources=resources[job.point.key].get(job.stage, {}),
         )
     path = store.home / JOBS
@@ -269,6 +313,8 @@ def _threads(job: Job, jobs: Sequence[Job], machine: Machine, resources: Jobs) -
     """Return the cores of a job: the ranks of a shock, an equal share for each reflow, one for other stages."""
     if machine.slurm:
         return resources[job.stage]["cpus_per_task"] if job.stage in resources else 1
+    if machine.exclusive and job.is_of_companion:
+        return max(1, machine.cores // sum(other.stage == job.stage for other in jobs))
     if machine.exclusive:
         return machine.cores
     if job.stage == "shock":

@@ -5,7 +5,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from reflowshock.workflow.jobs.batch import BATCH, Machine, list_missing, write_jobs
+from reflowshock.workflow.jobs.batch import BATCH, Machine, list_missing, prepare, write_jobs
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.store.folders import lock_folder
 from reflowshock.workflow.store.point import Point
@@ -38,6 +38,6 @@ def prepare_run(config: Mapping[str, Any], cores: int) -> tuple[Store, Point]:
     jobs = list_missing(store, [point], case.pipeline.names[-1])
     discard(store.home / BATCH)
     for job in jobs:
-        store.prepare_work(point, job.stage)
+        prepare(store, job)
     write_jobs(store, jobs, Machine(cores, exclusive=True, oversubscribe=oversubscribe, live=True))
     return store, point

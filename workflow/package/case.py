@@ -12,7 +12,8 @@ from reflowshock.meshing.board.parameters import Board, Package, Warpage
 from reflowshock.parameters import with_value
 from reflowshock.particles.parameters.solder import Reflow, Solder
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.case.stage import Pipeline, Stage, report_of
+from reflowshock.workflow.case.error_settings import CaseNumerics, Method
+from reflowshock.workflow.case.stage import ERROR_METHOD, ERRORS, Pipeline, Stage, report_of
 from reflowshock.workflow.case.toml_file import resolved_path
 from reflowshock.workflow.package import given_surfaces, reference
 
@@ -59,12 +60,13 @@ JUDGED_BY = ("shock.failure",)  # changes only the verdict, so histories stay va
 COOLED = ("thermal.solidification", "thermal.final", "thermal.effects.residual_stress")
 
 
-def package_pipeline(heated: bool, dropped: bool) -> Pipeline:
+def package_pipeline(heated: bool, dropped: bool, estimated: bool = False) -> Pipeline:
     """Return the stages of a package on a board.
 
     Args:
         heated: Whether the reflow has temperatures, and so needs the mesh of board and package.
         dropped: Whether the case has a shock.
+        estimated: Whether companions on coarser meshes estimate the errors of the shock.
     """
     geometry = Stage(
         "geometry", DRAWN_MESH, (), ("geometry/assembly.msh", "geometry/pads.json", "geometry/preview.png")
@@ -85,9 +87,10 @@ def package_pipeline(heated: bool, dropped: bool) -> Pipeline:
     surface = Stage("surface", GIVEN, ("reflow",), ("surface/surfaces.json",))
     moved = ("shock", "materials", *BoardFittings.model_fields, *COOLED)
     shock = Stage("shock", moved, ("solder_mesh",), (), without=JUDGED_BY)
-    stages = (geometry, reflow, surface, solder_mesh, *((shock,) if dropped else ()))
+    motion = (*((shock,) if dropped else ()), *((ERRORS,) if estimated else ()))
+    stages = (geometry, reflow, surface, solder_mesh, *motion)
     follows = tuple(stage.name for stage in stages)
-    return Pipeline((*stages, report_of(*follows, parameters=JUDGED_BY if dropped else ())))
+    return Pipeline((*stages, report_of(*follows, parameters=(*JUDGED_BY, ERROR_METHOD) if dropped else ())))
 
 
 BOARD_DROP = package_pipeline(heated=False, dropped=True)
@@ -188,6 +191,7 @@ class BoardDropCase(PackageCase, BoardFittings):
     ranks_key = "shock.ranks.total"
 
     shock: Shock
+    numerics: CaseNumerics = CaseNumerics()
 
     @property
     def cooled(self) -> bool:
@@ -196,8 +200,18 @@ class BoardDropCase(PackageCase, BoardFittings):
 
     @property
     def pipeline(self) -> Pipeline:
-        """Stages of the package, then the shock."""
-        return package_pipeline(heated=self.thermal is not None, dropped=True)
+        """Stages of the package, then the shock and the estimate of its errors."""
+        return package_pipeline(self.thermal is not None, dropped=True, estimated=self.estimates_errors)
+
+    @property
+    def error_method(self) -> Method:
+        """Origin of the discretisation errors."""
+        return self.numerics.error.method
+
+    @property
+    def estimates_errors(self) -> bool:
+        """Whether companions estimate the errors; with temperatures each of them would repeat the reflow."""
+        return self.error_method == "estimate" and self.thermal is None
 
     @classmethod
     def located(cls, table: dict, folder: Path) -> dict:

@@ -33,6 +33,7 @@ def conclude(run_folder: Path, case: BoardDropCase, summary: dict, known: Discre
     main = next(iter(histories))
     summary["effects"][Failing.name] = Failing.by_limits(case.shock.failure)
     coarse = _coarse(results[main], histories[main]["joints"])
+    summary["errors"] = known.record(results)
     survivor = reference.metrics_of(case.shock.failure.reference)
     verdict = verdict_of(JudgedDrop(case, summary["metrics"], histories[main], coarse, survivor))
     if PEEL in known.errors:

@@ -22,8 +22,8 @@ FIGURES = (
 HEAD = ("", "value", "discretisation error", "two-scale error", "neglected effects, expected influence")
 NOTE = (
     "Discretisation error: grid convergence index (Roache 1994), 1.25 times the difference from the Richardson limit of"
-    " three meshes, or 3 times the difference from the finest mesh if they show no order. Two-scale error: difference"
-    " from one model on the same mesh."
+    " three meshes, or 3 times the difference expected from the theoretical order if they show no order. Two-scale"
+    " error: difference from one model on the same mesh."
 )
 
 

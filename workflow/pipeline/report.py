@@ -52,6 +52,7 @@ def moving_scene(run_folder: Path, case: Case) -> Scene | None:
 def _concluded(run_folder: Path, case: Case) -> tuple[dict, Discretisation]:
     """Return the summary of a run with its conclusions, and its discretisation errors."""
     summary, errors = collect_summary(run_folder, case), discretisation(run_folder, case)
+    summary["errors"] = errors.record({})
     kind_of(case).conclude(run_folder, case, summary, errors)
     return summary, errors
 

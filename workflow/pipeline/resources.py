@@ -7,7 +7,7 @@ from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.kinds import kind_of
 
 # Short serial stages, which run in the command instead of a job.
-WITH_COMMAND = ("comparison", "report")
+WITH_COMMAND = ("comparison", "errors", "report")
 MOST_CORES = 16  # for a reflow with processes on one node
 MEGABYTES, MEGABYTES_OF_PROCESS = 1500, 500  # interpreter, Snakemake, libraries
 MINUTES, MARGIN = 10, 3.0  # wall time: constant part for start and compilation, factor on the forecast

@@ -18,17 +18,52 @@ class Discretisation:
 
     Attributes:
         errors: Relative error of each metric.
-        how: Origin of each error, in words.
+        how: Origin of each error, or why it is unknown, in words.
         unknown: Reason why other errors are unknown, or how to obtain them.
+        orders: Observed order of each metric that has one.
     """
 
     errors: Mapping[str, float] = field(default_factory=dict)
     how: Mapping[str, str] = field(default_factory=dict)
     unknown: str = UNMEASURED
+    orders: Mapping[str, float] = field(default_factory=dict)
 
     def text(self, name: str) -> str:
         """Return the error of a figure, as text."""
-        return f"±{percent(self.errors[name])} ({self.how[name]})" if name in self.errors else NOT_KNOWN
+        if name in self.errors:
+            return f"±{percent(self.errors[name])} ({self.how[name]})"
+        return self.how.get(name, NOT_KNOWN)
+
+    def record(self, results: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+        """Return the errors for ``summary.json``, by metric.
+
+        Args:
+            results: ``result.json`` of each mode of a drop, the main mode first; empty for other kinds of case.
+        """
+        return {
+            name: {
+                "discretisation": self.errors.get(name),
+                "order": self.orders.get(name),
+                "two_scale": scheme_share(name, results),
+                "how": how,
+            }
+            for name, how in self.how.items()
+        }
+
+
+def scheme_share(name: str, results: Mapping[str, Mapping[str, Any]]) -> float | None:
+    """Return the relative difference of a figure between the first mode and one model on the same mesh, if known."""
+    if len(results) < 2 or _ends_early(results):
+        return 0.0 if list(results) == ["dns"] else None
+    ours, theirs = (result["metrics"].get(name, {"value": None})["value"] for result in list(results.values())[:2])
+    is_number = isinstance(ours, int | float) and isinstance(theirs, int | float)
+    return abs(ours / theirs - 1.0) if is_number and theirs else None
+
+
+def _ends_early(results: Mapping[str, Mapping[str, Any]]) -> bool:
+    """Return whether the second mode ends before the first one."""
+    ends = [result["model"]["window"] * result["model"]["windows"] for result in list(results.values())[:2]]
+    return bool(ends[1] < (1.0 - 1e-6) * ends[0])
 
 
 def scheme_error(name: str, results: Mapping[str, Mapping[str, Any]]) -> str:
@@ -43,12 +78,13 @@ def scheme_error(name: str, results: Mapping[str, Mapping[str, Any]]) -> str:
     if not others:
         return "none: one model" if first == "dns" else NOT_KNOWN
     ours, theirs = (results[mode]["metrics"].get(name, {"value": None})["value"] for mode in (first, others[0]))
-    ends = [results[mode]["model"]["window"] * results[mode]["model"]["windows"] for mode in (first, others[0])]
-    if ends[1] < (1.0 - 1e-6) * ends[0]:
-        return f"not known: the {mode_name(others[0])} ends at {1e3 * ends[1]:.3g} ms"
+    if _ends_early(results):
+        model = results[others[0]]["model"]
+        return f"not known: the {mode_name(others[0])} ends at {1e3 * model['window'] * model['windows']:.3g} ms"
     if isinstance(ours, str) or isinstance(theirs, str):
         return "none" if ours == theirs else f"{theirs} in the {mode_name(others[0])}"
-    return NOT_KNOWN if ours is None or not theirs else percent(abs(ours / theirs - 1.0))
+    share = scheme_share(name, results)
+    return NOT_KNOWN if share is None else percent(share)
 
 
 def left_out(effects: Mapping[str, Mapping[str, Any]]) -> str:

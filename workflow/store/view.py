@@ -6,7 +6,7 @@ Links and files of the program are listed in ``.store/views/<key of the folder>.
 import json
 import os
 import shutil
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,19 +27,26 @@ class Link:
     digest: str
 
 
-def show(store: Store, point: Point, stages: Iterable[str]) -> list[str]:
+Companions = Mapping[str, tuple[Point, Iterable[str]]]
+
+
+def show(store: Store, point: Point, stages: Iterable[str], companions: Companions | None = None) -> list[str]:
     """Link the products of some stages of a point into its run folder and remove all other links.
 
     Args:
         store: Store of the products.
         point: Point of the run folder.
         stages: Stages whose products exist and are intact.
+        companions: Folder in the run folder -> companion and its intact stages.
 
     Returns:
         Names of files that were missing or modified in the run folder and have been restored.
     """
     folder = store.run_folder(point)
     links = _expected_links(store, point, set(stages))
+    for name, (companion, intact) in (companions or {}).items():
+        products = _expected_links(store, companion, set(intact))
+        links |= {f"{name}/{path}": link for path, link in products.items() if "/" in path}
     before = list_program_files(store, folder)
     _clear_path(folder, CASE)
     write_case(folder, point.case)

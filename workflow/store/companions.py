@@ -1,0 +1,46 @@
+"""Companions of a run in its store: the same case on coarser meshes, linked in the work folder of the stage errors."""
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+from reflowshock.workflow.case.stage import ERRORS
+from reflowshock.workflow.store.point import Point
+from reflowshock.workflow.store.product import discard
+from reflowshock.workflow.store.store import Store
+
+FOLDER = "companions"  # in a run folder and in the work folder of the stage
+FAILED = "failed.txt"  # message of a companion without a result
+UNTIL = ERRORS.follows[-1]  # last stage of a companion
+
+Companions = Mapping[float, Point]
+
+
+def companion_name(size: float) -> str:
+    """Return the name of the folder of a companion, from its element size relative to the case."""
+    return f"{FOLDER}/size_{size:g}"
+
+
+def companion_folder(run_folder: Path, size: float) -> Path:
+    """Return the folder with the products of a companion."""
+    return run_folder / companion_name(size)
+
+
+def link_companions(store: Store, work: Path, companions: Companions) -> None:
+    """Link the results of companions into the work folder of the stage errors; write the message of each failure."""
+    for size, point in companions.items():
+        folder = companion_folder(work, size)
+        folder.mkdir(parents=True, exist_ok=True)
+        discard(folder / UNTIL)
+        if store.has(point, UNTIL):
+            (folder / UNTIL).symlink_to(os.path.relpath(store.product(point, UNTIL), folder))
+            (folder / FAILED).unlink(missing_ok=True)
+        else:
+            (folder / FAILED).write_text(_message(store, point), encoding="utf-8")
+
+
+def _message(store: Store, point: Point) -> str:
+    """Return the first line of the message of the stage at which a companion ended."""
+    stages = [stage.name for stage in point.case.pipeline.upstream(UNTIL) if not store.has(point, stage.name)]
+    text = next((message for stage in stages if (message := store.message(point, stage))), "ended without a message")
+    return f"stage {stages[0]} failed: {text.strip().splitlines()[0]}"
