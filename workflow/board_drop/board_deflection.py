@@ -63,13 +63,27 @@ def expected_duration(case: "BoardDropCase") -> float:
     Raises:
         PulseError: The table of the pulse cannot be read.
     """
+    return _expected_end(case, 0.75)
+
+
+def expected_search(case: "BoardDropCase") -> float:
+    """Return the expected duration of the search of a case [s], which adds two swings if the board is damped.
+
+    Raises:
+        PulseError: The table of the pulse cannot be read.
+    """
+    return _expected_end(case, 1.25 if decided(case).shock.damping.acts else 0.75)
+
+
+def _expected_end(case: "BoardDropCase", periods: float) -> float:
+    """Return the end of a shock of automatic duration a number of periods after its pulse [s]."""
     longest, omega = longest_duration(case), first_mode(case)[1]
     if case.shock.duration != "auto":
         return longest
     pulse, period = longest - math.tau / omega, PERIOD_RATIO * math.tau / omega
     if decided(case).shock.numerics.kinematics != "small":
         period *= stretched_period(PERIOD_RATIO * expected_deflection(case).largest / case.board.thickness)
-    return min(longest, pulse + 0.75 * period)
+    return min(longest, pulse + periods * period)
 
 
 def stretched_period(deflection: float) -> float:

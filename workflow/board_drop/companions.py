@@ -1,4 +1,4 @@
-"""Companions of a drop: the same drop on two coarser meshes, from which its discretisation errors are estimated.
+"""Companions of a drop: the same drop on two coarser meshes, for discretisation errors and critical joints.
 
 The fine joints and the end of a companion are those of the run. Layers of board, substrate, die and copper and those of
 the averaging layer of a joint stay, because so few elements cannot be coarsened by 1.5.
@@ -11,13 +11,14 @@ from typing import Any
 
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.parameters import with_value
-from reflowshock.workflow.board_drop.board_deflection import expected_duration
+from reflowshock.workflow.board_drop.board_deflection import decided, expected_duration
 from reflowshock.workflow.board_drop.fine_joints import read_fine_joints
 from reflowshock.workflow.board_drop.shock_launch import MODES
 from reflowshock.workflow.package.case import BoardDropCase
 from reflowshock.workflow.process.products import read_json
 
 SIZES = (1.5, 2.0)  # element sizes relative to the case
+SEARCH = 2.0  # that of the search for critical joints
 JOINTS = "package.joint_numerics"
 
 Values = dict[str, Any]
@@ -46,6 +47,29 @@ def companions(case: BoardDropCase, shock: Path | None) -> dict[float, BoardDrop
         "shock.ranks.macro": None,
     }
     return {size: with_values(case, same | coarser(case, size)) for size in SIZES}
+
+
+def search_case(case: BoardDropCase) -> BoardDropCase:
+    """Return the case of a search: larger elements, all joints coarse, and no output but histories.
+
+    With temperatures, the elements keep their size, because the meshes then depend on the reflow.
+    """
+    same = {
+        "shock.coupling.fine_joints": "all",
+        "shock.coupling.direction": "two_way",
+        "shock.numerics.modes": ("two_scale",),
+        "shock.numerics.field_samples": 2,
+        "shock.picture_times": (),
+        "shock.modes": 0,
+    }
+    return with_values(case, same | ({} if case.thermal else coarser(case, SEARCH)))
+
+
+def needs_search(case: BoardDropCase) -> bool:
+    """Return whether a two-scale run has critical joints, or an end, that a search must find."""
+    shock = case.shock
+    finds_end = shock.duration == "auto" and decided(case).shock.damping.acts and not case.thermal
+    return "two_scale" in shock.numerics.modes and (shock.coupling.fine_joints == "critical" or finds_end)
 
 
 def with_values(case: BoardDropCase, values: Values) -> BoardDropCase:

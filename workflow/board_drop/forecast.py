@@ -7,11 +7,10 @@ from reflowshock.fem.problem.thermal import Thermal
 from reflowshock.materials.roles import Materials
 from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import shock_cooling
-from reflowshock.workflow.board_drop.board_deflection import decided, expected_duration
+from reflowshock.workflow.board_drop.board_deflection import decided, expected_duration, expected_search
 from reflowshock.workflow.board_drop.duration import longest_duration
 from reflowshock.workflow.board_drop.part_forecast import (
     PartForecast,
-    coarse_parts,
     forecast_parts,
     two_scale_parts,
 )
@@ -20,6 +19,7 @@ from reflowshock.workflow.board_drop.shock_forecast import (
     ShockForecast,
     forecast_shock,
     mode_seconds,
+    search_seconds,
     seconds_outside_windows,
     shorter_than_window,
 )
@@ -49,6 +49,8 @@ class PackageForecast:
         shock: Time steps and wall time of the shock; None without a shock.
         seconds: Predicted wall time of each stage [s], where there is a prediction.
         load_steps: Load steps with liquid solder; 0 without ``[thermal]``.
+        search: Predicted wall time of the search for critical joints and the end [s], part of the stage shock; zero
+            without one.
     """
 
     effects: dict
@@ -59,6 +61,7 @@ class PackageForecast:
     shock: ShockForecast | None
     seconds: dict[str, float]
     load_steps: int = 0
+    search: float = 0.0
 
 
 def forecast_package(case: PackageCase) -> PackageForecast:
@@ -112,7 +115,8 @@ def forecast_board_drop(case: BoardDropCase) -> PackageForecast:
         each part of the mesh, and scheme, time steps and wall times of the shock.
     """
     reflow = forecast_package(case)
-    share = expected_duration(case) / longest_duration(case)
+    longest = longest_duration(case)
+    share, search = expected_duration(case) / longest, search_seconds(case, expected_search(case) / longest)
     drop_effects, case = shock_effects(case), decided(case)
     parts = forecast_parts(case)
     shock = forecast_shock(case, parts, share)
@@ -125,14 +129,14 @@ def forecast_board_drop(case: BoardDropCase) -> PackageForecast:
         "dns": share * dns + seconds_outside_windows(case, parts, share * shock.dns_share),
     }
     again = modes["two_scale" if "two_scale" in numerics.modes else "dns"]
-    if shock.search:
-        modes["two_scale"] += share * shock.search + seconds_outside_windows(case, coarse_parts(case), share)
+    modes["two_scale"] += search
     identical = again if case.shock.identical_joints else 0.0
     return replace(
         reflow,
         effects=reflow.effects | drop_effects | cooling,
         parts=two_scale_parts(case) if "two_scale" in numerics.modes else parts,
         shock=shock,
+        search=search,
         seconds=reflow.seconds | {"shock": sum(modes[mode] for mode in numerics.modes) + identical + once},
     )
 

@@ -82,7 +82,9 @@ BETWEEN = "+"  # separator in the names of bridged pairs
 IMAGE = "_image"  # suffix of the name of a joint behind a plane of symmetry
 
 
-def mesh_real_joints(case: PackageCase, run_folder: Path, folder: Path, *, coarse: bool) -> dict[str, dict]:
+def mesh_real_joints(
+    case: PackageCase, run_folder: Path, folder: Path, *, coarse: bool, flat: Path | None = None
+) -> dict[str, dict]:
     """Place the package at its position after solidification and mesh the joints; return their quality.
 
     Args:
@@ -90,6 +92,7 @@ def mesh_real_joints(case: PackageCase, run_folder: Path, folder: Path, *, coars
         run_folder: Run folder with the products of the preceding stages.
         folder: Folder into which assembly, joint meshes and qualities are written.
         coarse: Whether each joint is also meshed coarse.
+        flat: Mesh of flat board and package; None for that of the stage geometry.
 
     Returns:
         Quality by kind of mesh (prefix of files and metrics), then by joint; kinds without joints are left out.
@@ -106,7 +109,8 @@ def mesh_real_joints(case: PackageCase, run_folder: Path, folder: Path, *, coars
     displacement = (
         read_displacement(structure) if structure.exists() else prescribed_displacement(case.package, case.warpage)
     )
-    side = write_displaced_assembly(run_folder / "geometry/assembly.msh", displacement, folder / "assembly.msh")
+    flat = flat or run_folder / "geometry/assembly.msh"
+    side = write_displaced_assembly(flat, displacement, folder / "assembly.msh")
     sites = {site.name: site for site in read_pads(run_folder / "reflow/pads.json")}
     surfaces = {path.stem: read_surface(path) for path in sorted((run_folder / "surface").glob("*.vtu"))}
     bodies = [(surfaces[name], site) for name, site in sites.items() if name in surfaces]

@@ -43,7 +43,7 @@ def board_drop_tables(case: BoardDropCase, outlook: PackageForecast) -> Iterator
     """
     assert outlook.shock is not None
     yield _sizes(case, outlook)
-    yield _shock(case, outlook.shock)
+    yield _shock(case, outlook.shock, outlook.search)
     rate = f"{outlook.shock.updates_per_second:.1e} element updates per second and rank (fem/estimates/estimate.py)"
     yield style_text("\n[dim]Costs assume {}", rate)
     yield style_text(
@@ -82,7 +82,7 @@ def _expected(shock: ShockForecast, seconds: float) -> str:
     return f"about {duration(shock.share * seconds)}{most}"
 
 
-def _shock(case: BoardDropCase, shock: ShockForecast) -> Table:
+def _shock(case: BoardDropCase, shock: ShockForecast, search: float) -> Table:
     rank_count = case.shock.ranks.total
     table = new_table("\nShock", "what", "value", "remark")
     table.add_row("scheme", shock.scheme.replace("_", " "), shock.reason)
@@ -94,8 +94,8 @@ def _shock(case: BoardDropCase, shock: ShockForecast) -> Table:
     table.add_row("window", short(shock.window), f"step of the macro model, {shock.windows} windows")
     table.add_row("steps per window", *_levels(shock))
     table.add_row("step ratio m", f"{shock.substeps}", f"step of the DNS {short(shock.window / shock.substeps)}")
-    if shock.search:
-        table.add_row("coarse run", _expected(shock, shock.search), "all joints coarse, to find the critical ones")
+    if search:
+        table.add_row("search", f"about {duration(search)}", "coarse joints, larger elements: critical joints and end")
     table.add_row("two-scale", _expected(shock, shock.two_scale), _placement(case) + _absent("two_scale", case))
     if case.shock.identical_joints:
         again = shock.two_scale if "two_scale" in case.shock.numerics.modes else shock.dns

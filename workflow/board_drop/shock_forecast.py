@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from reflowshock.problem import Problem
+from reflowshock.workflow.board_drop.board_deflection import decided
+from reflowshock.workflow.board_drop.companions import needs_search, search_case
 from reflowshock.workflow.board_drop.duration import longest_duration
 from reflowshock.workflow.board_drop.part_forecast import (
     MACRO,
@@ -83,8 +85,6 @@ class ShockForecast:
         window: Step of the macro model [s].
         substeps: Steps of a DNS in a window, m.
         windows: Number of windows.
-        search: Predicted wall time of the windows of the coarse run that finds the critical joints [s], zero where
-            the case names them.
         two_scale: Predicted wall time of the windows of the two-scale run [s].
         dns: Predicted wall time of the windows of the DNS with explicit steps [s].
         dns_share: Share of the windows that the DNS computes.
@@ -100,7 +100,6 @@ class ShockForecast:
     window: float
     substeps: int
     windows: int
-    search: float
     two_scale: float
     dns: float
     dns_share: float
@@ -139,7 +138,6 @@ def forecast_shock(case: "BoardDropCase", parts: Parts, share: float = 1.0) -> S
 
     shock = case.shock
     two_scale = _forecast_two_scale(case, two_scale_parts(case))
-    search = _forecast_two_scale(case, coarse_parts(case)).seconds if shock.coupling.fine_joints == "critical" else 0.0
     plan = _plan(case, parts)
     dns_plan = shorten_plan(plan, shock.numerics.dns_duration or longest_duration(case))
     dns_share = dns_plan.windows / plan.windows
@@ -153,7 +151,6 @@ def forecast_shock(case: "BoardDropCase", parts: Parts, share: float = 1.0) -> S
         window=plan.window,
         substeps=plan.substeps,
         windows=plan.windows,
-        search=search,
         two_scale=two_scale.seconds,
         dns=dns_share * _dns_seconds(case, parts, plan),
         dns_share=dns_share,
@@ -175,6 +172,20 @@ def seconds_outside_windows(case: "BoardDropCase", parts: Parts, share: float = 
     histories, fields = share * numerics.history_samples, share * numerics.field_samples
     shared = elements / case.shock.ranks.total * (histories * SAMPLE_SECONDS + fields * FIELD_SECONDS)
     return SECONDS_TO_START + SETUP_SECONDS * elements + histories * SECONDS_OF_SAMPLE + shared
+
+
+def search_seconds(case: "BoardDropCase", share: float) -> float:
+    """Predict the wall time [s] of the search for critical joints and the end; zero for a case without search.
+
+    Args:
+        case: Case of a board drop, as read.
+        share: Expected duration of the search over its longest duration, 0 to 1.
+    """
+    if not needs_search(case):
+        return 0.0
+    coarse = search_case(decided(case))
+    parts = coarse_parts(coarse)
+    return share * _forecast_two_scale(coarse, parts).seconds + seconds_outside_windows(coarse, parts, share)
 
 
 def mode_seconds(case: "BoardDropCase") -> float:

@@ -100,9 +100,10 @@ def shock(run: Run[BoardDropCase], folder: Path) -> Findings:
     Returns:
         Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
     """
+    from reflowshock.workflow.board_drop.search import find_fine_joints
     from reflowshock.workflow.board_drop.shock_cooling import with_cooling
     from reflowshock.workflow.board_drop.shock_effects import with_influence
-    from reflowshock.workflow.board_drop.shock_launch import find_fine_joints, read_results, run_mode
+    from reflowshock.workflow.board_drop.shock_launch import read_results, run_mode
     from reflowshock.workflow.reflow.joints import refuse_joints_without_mesh
 
     joints = read_json(run.folder / "reflow/joints.json")
