@@ -42,7 +42,7 @@ def conclude(run_folder: Path, case: BoardDropCase, summary: dict, known: Discre
     summary |= {
         "verdict": verdict,
         "warnings": [warning for warning in _warnings(case, histories[main]) if warning],
-        "answer": answer(verdict, known.errors.get(deciding)),
+        "answer": answer(verdict, known.errors.get(deciding), known.how.get(deciding, known.unknown)),
     }
 
 

@@ -1,11 +1,11 @@
-"""First table of a drop report: headline figures with discretisation error, two-scale error, neglected effects."""
+"""Headline figures of a drop report with their errors, and the neglected effects."""
 
 from collections.abc import Mapping
 from typing import Any
 
 from reflowshock.fem.problem.shock import Shock
 from reflowshock.workflow.report import tables
-from reflowshock.workflow.report.errors import NOT_KNOWN, Discretisation, left_out, scheme_error
+from reflowshock.workflow.report.errors import Discretisation, left_out, scheme_error
 
 FIGURES = (
     ("critical_joint", "critical joint"),
@@ -19,12 +19,13 @@ FIGURES = (
     ("peak_board_displacement", "peak deflection of the board centre"),
     ("peak_element_stress", "largest von Mises stress of an element (mesh-dependent, not for ranking)"),
 )
-HEAD = ("", "value", "discretisation error", "two-scale error", "neglected effects, expected influence")
-NOTE = (
-    "Discretisation error: grid convergence index (Roache 1994), 1.25 times the difference from the Richardson limit of"
-    " three meshes, or 3 times the difference expected from the theoretical order if they show no order. Two-scale"
-    " error: difference from one model on the same mesh."
+HEAD = ("", "value", "discretisation error", "two-scale error")
+NONE = "–"  # of a figure without this error
+DISCRETISATION = (
+    " Discretisation error: grid convergence index (Roache 1994), 1.25 times the difference from the Richardson limit"
+    " of three meshes, or 3 times the difference expected from the theoretical order if they show no order."
 )
+TWO_SCALE = " Two-scale error: difference from one model on the same mesh."
 
 
 def later_swings(shock: Shock, end: float, why: str = "") -> str:
@@ -49,7 +50,7 @@ def later_swings(shock: Shock, end: float, why: str = "") -> str:
 
 
 def headline(metrics: Mapping[str, dict], known: Discretisation, summary: Mapping, results: Mapping[str, Any]) -> dict:
-    """Return the table of headline figures with value and errors, the common neglected effects, and a note.
+    """Return the table of headline figures with the errors that are known, and a note with the neglected effects.
 
     Args:
         metrics: Name -> record with ``value`` (SI) and ``unit``.
@@ -59,21 +60,24 @@ def headline(metrics: Mapping[str, dict], known: Discretisation, summary: Mappin
             the main mode first.
 
     Returns:
-        Table with ``head``, ``rows`` (lists of text), ``left_out`` (neglected effects as text) and ``note``.
+        Table with ``head``, ``rows`` (lists of text) and ``note``; a column without any error is left out.
     """
-    figures = {name: label for name, label in FIGURES if name in metrics}
     rows = [
         [
             label,
             tables.named_quantity(dict(metrics), name),
-            "–" if isinstance(metrics[name]["value"], str) else known.text(name),
-            scheme_error(name, results),
+            NONE if isinstance(metrics[name]["value"], str) else known.text(name) or NONE,
+            scheme_error(name, results) or NONE,
         ]
-        for name, label in figures.items()
+        for name, label in FIGURES
+        if name in metrics
     ]
-    note = NOTE
-    if any(row[2] == NOT_KNOWN for row in rows):
-        note += f" Discretisation error unknown: {known.unknown}."
-    if any(row[3] == NOT_KNOWN for row in rows) and len(results) == 1:
-        note += ' Two-scale error unknown: add "dns" (one model at the small step) to shock.numerics.modes.'
-    return {"head": HEAD, "rows": rows, "left_out": left_out(summary["effects"]), "note": note}
+    columns = [0, 1, *(column for column in (2, 3) if any(row[column] != NONE for row in rows))]
+    note = f"Neglected effects by expected influence: {left_out(summary['effects'])}."
+    note += DISCRETISATION if known.errors else f" The discretisation error is not estimated: {known.unknown}."
+    note += TWO_SCALE if 3 in columns else ""
+    return {
+        "head": [HEAD[column] for column in columns],
+        "rows": [[row[column] for column in columns] for row in rows],
+        "note": note,
+    }

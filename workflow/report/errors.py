@@ -8,7 +8,6 @@ from reflowshock.workflow.case.text import percent
 from reflowshock.workflow.report.tables import mode_name
 
 NEGLIGIBLE = 0.01  # smallest expected influence of a neglected effect that is reported
-NOT_KNOWN = "not known"
 UNMEASURED = "reflowshock accuracy measures it"
 
 
@@ -29,10 +28,10 @@ class Discretisation:
     orders: Mapping[str, float] = field(default_factory=dict)
 
     def text(self, name: str) -> str:
-        """Return the error of a figure, as text."""
+        """Return the error of a figure as text, or why it has none; empty if nothing is known of it."""
         if name in self.errors:
             return f"±{percent(self.errors[name])} ({self.how[name]})"
-        return self.how.get(name, NOT_KNOWN)
+        return self.how.get(name, "")
 
     def record(self, results: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
         """Return the errors for ``summary.json``, by metric.
@@ -71,20 +70,22 @@ def scheme_error(name: str, results: Mapping[str, Mapping[str, Any]]) -> str:
 
     Args:
         name: Name of the metric.
-        results: Mode -> content of its ``result.json`` (``model``, ``metrics``, ``health``, ``timings``, ``coupling``);
-            with one mode the error is unknown, or none for a DNS.
+        results: Mode -> content of its ``result.json`` (``model``, ``metrics``, ``health``, ``timings``, ``coupling``).
+
+    Returns:
+        Difference in per cent, or why there is none; empty if only one mode was run.
     """
     first, *others = results
     if not others:
-        return "none: one model" if first == "dns" else NOT_KNOWN
+        return ""
     ours, theirs = (results[mode]["metrics"].get(name, {"value": None})["value"] for mode in (first, others[0]))
     if _ends_early(results):
         model = results[others[0]]["model"]
-        return f"not known: the {mode_name(others[0])} ends at {1e3 * model['window'] * model['windows']:.3g} ms"
+        return f"the {mode_name(others[0])} ends at {1e3 * model['window'] * model['windows']:.3g} ms"
     if isinstance(ours, str) or isinstance(theirs, str):
         return "none" if ours == theirs else f"{theirs} in the {mode_name(others[0])}"
     share = scheme_share(name, results)
-    return NOT_KNOWN if share is None else percent(share)
+    return "" if share is None else percent(share)
 
 
 def left_out(effects: Mapping[str, Mapping[str, Any]]) -> str:

@@ -13,15 +13,16 @@ OF_JOINTS = tuple(limit.name for limit in JOINT_LIMITS)
 Record = Mapping[str, Any]
 
 
-def answer(verdict: Record, error: float | None) -> str:
+def answer(verdict: Record, error: float | None, unknown: str = "") -> str:
     """Return the verdict in one line, with the criterion that decides and its margin.
 
     Args:
         verdict: Record of ``verdict_of``, with ``criterion``, ``criteria``, ``joint``, ``joints`` and perhaps ``life``.
         error: Relative discretisation error of the value of the joint that is named; None if unknown.
+        unknown: Reason why it is unknown.
     """
     joint = verdict["joints"][verdict["joint"]]
-    discretisation = "not known, run reflowshock accuracy" if error is None else f"±{100.0 * error:.2g} %"
+    discretisation = f"unknown ({unknown})" if error is None else f"±{100.0 * error:.2g} %"
     life = f"; {in_drops(verdict['life'])}" if "life" in verdict else ""
     deciding = next((record for record in verdict["criteria"] if record["name"] == verdict["criterion"]), None)
     if deciding is None or deciding["name"] in OF_JOINTS:

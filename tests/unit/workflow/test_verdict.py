@@ -54,7 +54,7 @@ def test_without_a_criterion_there_is_no_verdict():
     assert verdict["joints"]["A2"] == {
         "criterion": "peel_stress", "value": 8e6, "limit": None, "margin": None, "verdict": NO_LIMIT
     }  # fmt: skip
-    assert answer(verdict, None) == "A2: peel 8 MPa, NO LIMIT; discretisation not known, run reflowshock accuracy"
+    assert answer(verdict, None, "off") == "A2: peel 8 MPa, NO LIMIT; discretisation unknown (off)"
 
 
 def test_tension_counts_at_either_pad_and_any_time_and_compression_does_not():
