@@ -29,7 +29,7 @@ from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.forecast import SECONDS_OF_REPORT, SECONDS_OF_STAGE, Size
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.run import Findings, Run, StageFunction
-from reflowshock.workflow.case.stage import ERRORS
+from reflowshock.workflow.case.stage import ERRORS, SHOCK
 from reflowshock.workflow.convergence.convergence_study import ConvergenceStudy
 from reflowshock.workflow.flows.flow_kind import STAGE as FLOW_STAGE
 from reflowshock.workflow.flows.flow_kind import FlowCase, FlowKind
@@ -37,6 +37,7 @@ from reflowshock.workflow.flows.forecast import flow_size, flow_tables, forecast
 from reflowshock.workflow.flows.registry import FLOWS
 from reflowshock.workflow.flows.stage import run_flow
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
+from reflowshock.workflow.process.machine_speed import slowness
 from reflowshock.workflow.reflow.stage import reflow
 from reflowshock.workflow.report.errors import Discretisation
 from reflowshock.workflow.solder import case as solder_case
@@ -333,14 +334,15 @@ def stage_seconds(case: Case) -> dict[str, float]:
 
 
 def every_stage(case: Case, predicted: Mapping[str, float]) -> dict[str, float]:
-    """Complete predicted wall times with default values of the short stages.
+    """Complete predicted wall times with default values of the short stages, and correct shocks for this machine.
 
     Args:
         case: Case, whose pipeline gives the stages.
-        predicted: Name of a stage -> predicted wall time [s].
+        predicted: Name of a stage -> predicted wall time [s]; that of a shock on the reference machine.
 
     Returns:
         Name of each stage, in order -> wall time [s].
     """
     usual = dict.fromkeys(case.pipeline.names, SECONDS_OF_STAGE) | {case.pipeline.names[-1]: SECONDS_OF_REPORT}
-    return usual | dict(predicted)
+    times = usual | dict(predicted)
+    return times | {name: slowness() * times[name] for name in (SHOCK,) if name in times}

@@ -9,13 +9,14 @@ from rich.table import Table
 
 from reflowshock.workflow.case.case import FULL, Case
 from reflowshock.workflow.case.fields import display, leaves
-from reflowshock.workflow.case.stage import ERRORS
+from reflowshock.workflow.case.stage import ERRORS, SHOCK
 from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.effects.page import effects_table
 from reflowshock.workflow.kinds import every_stage, kind_of, stage_seconds
 from reflowshock.workflow.pipeline.companions import at_once, companion_seconds
 from reflowshock.workflow.pipeline.gate import LONG
 from reflowshock.workflow.process.kernel_folder import compilation_time
+from reflowshock.workflow.process.machine_speed import UNMEASURED, machine_speed
 from reflowshock.workflow.process.terminal import new_table, style_text
 from reflowshock.workflow.store.companions import companion_name
 from reflowshock.workflow.store.keys import Change
@@ -92,6 +93,9 @@ def show_plan(store: Store, point: Point, console: Console) -> None:
     console.print(effects_table(case, outlook.effects, kind.acts))
     for table in kind.plan(case, outlook):
         console.print(table)
+    if SHOCK in case.pipeline.names:
+        speed = machine_speed()
+        console.print(style_text("[dim]{}", UNMEASURED if speed is None else speed.in_words()))
 
 
 def change_text(change: Change, case: Case) -> str:

@@ -71,8 +71,9 @@ class Pipeline:
         return tuple(stage_name for stage_name in self.names if stage_name in upstream)
 
 
+SHOCK = "shock"  # stage of the time steps of a drop or a structure
 # Errors of the shock, estimated from companions on coarser meshes: workflow/convergence/error_estimate.py
-ERRORS = Stage("errors", (ERROR_METHOD,), ("shock",), ("errors/errors.json",))
+ERRORS = Stage("errors", (ERROR_METHOD,), (SHOCK,), ("errors/errors.json",))
 
 
 def report_of(*follows: str, parameters: tuple[str, ...] = ()) -> Stage:

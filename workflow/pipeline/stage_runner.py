@@ -6,11 +6,12 @@ import traceback
 from pathlib import Path
 
 from reflowshock.workflow.case.run import Run, StageError, StageFunction
-from reflowshock.workflow.case.stage import Stage
+from reflowshock.workflow.case.stage import SHOCK, Stage
 from reflowshock.workflow.convergence.accuracy_file import this_host
 from reflowshock.workflow.kinds import stage_seconds
 from reflowshock.workflow.process.error_exit import describe_error, is_interrupt
 from reflowshock.workflow.process.kernel_folder import compilation_time
+from reflowshock.workflow.process.machine_speed import measure_after
 from reflowshock.workflow.process.terminal import console, health_line
 from reflowshock.workflow.store.keys import compare, product_key, stage_inputs
 from reflowshock.workflow.store.product import discard, publish, read_record, seal
@@ -57,6 +58,8 @@ def run_stage(name: str, function: StageFunction, run: Run, product: Path) -> di
     record = seal(partial, record | before)
     publish(partial, product)
     discard(run.checkpoints(name))
+    if name == SHOCK:
+        measure_after(forecast)
     return record
 
 

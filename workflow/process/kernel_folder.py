@@ -40,10 +40,15 @@ def compilation_time(stages: Iterable[str], environment: Mapping[str, str] = os.
         stages: Names of the stages to run.
         environment: Variables by name, which give the folder of compiled kernels.
     """
-    named = environment.get(VARIABLE)
-    folder = Path(named) if named else _default_folder(environment)
+    folder = kernel_folder(environment)
     cached = {path.name.rpartition("-")[0] for path in source_cache(folder).rglob("*.nbi")} if folder else set()
     return sum(seconds for stage, (kernel, seconds) in KERNELS.items() if stage in stages and kernel not in cached)
+
+
+def kernel_folder(environment: Mapping[str, str] = os.environ) -> Path | None:
+    """Return the folder of compiled kernels, which need not exist; None without a home."""
+    named = environment.get(VARIABLE)
+    return Path(named) if named else _default_folder(environment)
 
 
 def _default_folder(environment: Mapping[str, str]) -> Path | None:

@@ -1,0 +1,93 @@
+"""Slowness of this machine: time of an element update over that of the reference machine of the forecasts.
+
+It is measured in a few seconds after the first long shock, when the kernels are compiled, and kept in their folder. A
+measurement beside other work is repeated after the next long shock.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from datetime import date
+from math import exp, log
+from pathlib import Path
+from statistics import fmean
+
+from reflowshock.workflow.process.kernel_folder import kernel_folder
+
+FILE = "speed.json"
+LONG = 30.0  # shortest predicted stage after which the machine is measured [s]
+IDLE = 0.25  # cores that others may use during a measurement
+PATIENCE = 300.0  # [s] for a measurement, most of it for kernels that a case did not need
+UNMEASURED = "Steps are assumed to be as fast as on the reference machine; this machine is measured after a long shock."
+STAT = Path("/proc/stat")
+
+
+@dataclass(frozen=True, slots=True)
+class MachineSpeed:
+    """Measured slowness.
+
+    Attributes:
+        slowness: Time of an element update over that of the reference machine, geometric mean of the element families.
+        families: The same of each family.
+        date: Day of the measurement, ISO format.
+        busy: Number of cores that other programs used.
+    """
+
+    slowness: float
+    families: dict[str, float]
+    date: str
+    busy: float
+
+    def in_words(self) -> str:
+        """Return what forecasts assume of this machine, as a sentence."""
+        load = f", beside other work on {self.busy:.1f} cores" if self.busy > IDLE else ""
+        return (
+            f"Steps take {self.slowness:.2g} times as long as on the reference machine, measured on {self.date}{load}."
+        )
+
+
+def machine_speed() -> MachineSpeed | None:
+    """Return the measured slowness of this machine; None before the first measurement or if its file is damaged."""
+    folder = kernel_folder()
+    with suppress(OSError, ValueError, TypeError):
+        if folder is not None:
+            return MachineSpeed(**json.loads((folder / FILE).read_text(encoding="utf-8")))
+    return None
+
+
+def slowness() -> float:
+    """Return the factor on times that the reference machine needs; one before the first measurement."""
+    speed = machine_speed()
+    return 1.0 if speed is None else speed.slowness
+
+
+def measure_after(predicted: float) -> None:
+    """Measure the slowness after a shock, unless the shock was short or a measurement on an idle machine exists.
+
+    Args:
+        predicted: Predicted wall time of the shock [s].
+    """
+    former, folder = machine_speed(), kernel_folder()
+    if predicted < LONG or folder is None or (former is not None and former.busy <= IDLE):
+        return
+    before, begin = _busy_seconds(), time.perf_counter()
+    command = [sys.executable, "-m", "reflowshock.fem.run.calibrate"]
+    with suppress(OSError, ValueError, subprocess.SubprocessError):  # without it, forecasts stay those of the reference
+        done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=True)
+        families = json.loads(done.stdout)
+        busy = (_busy_seconds() - before) / (time.perf_counter() - begin) - 1.0
+        mean = exp(fmean(log(value) for value in families.values()))
+        speed = MachineSpeed(mean, families, date.today().isoformat(), max(busy, 0.0))
+        (folder / FILE).write_text(json.dumps(asdict(speed), indent=1) + "\n", encoding="utf-8")
+
+
+def _busy_seconds() -> float:
+    """Return the time that all cores have been busy since the start of the system [s]; zero if it is unknown."""
+    if not STAT.is_file():
+        return 0.0
+    user, nice, system = STAT.read_text(encoding="ascii").split("\n", 1)[0].split()[1:4]
+    return (int(user) + int(nice) + int(system)) / os.sysconf("SC_CLK_TCK")
