@@ -52,7 +52,7 @@ def on_plane(cloud: Cloud, axis: int) -> NDArray[np.bool_]:
     """Return whether each particle of a cloud is on a plane of symmetry, shape (n,); it then stays there exactly.
 
     Args:
-        cloud: Cloud of the computed part.
+        cloud: Particles of the computed part of a body, cut off at the planes of symmetry that it lists.
         axis: 0 for the plane x = 0, 1 for y = 0.
     """
     return cloud.points[:, axis] == 0.0
@@ -83,7 +83,7 @@ def fold(cloud: Cloud, field: Floats, first: int = 0) -> Floats:
     """Return vectors without their normal components at particles on planes of symmetry, shape (k, 3).
 
     Args:
-        cloud: Cloud of the computed part.
+        cloud: Particles of the computed part of a body, cut off at the planes of symmetry that it lists.
         field: Vectors at consecutive particles, shape (k, 3); not changed.
         first: Number of the particle of the first vector.
     """
@@ -102,7 +102,7 @@ def whole_points(cloud: Cloud, points: Floats, wall: int) -> tuple[Floats, Indic
     """Return the points of the contact line of a wall around the whole body, and the vertex of each.
 
     Args:
-        cloud: Cloud of the computed part.
+        cloud: Particles of the computed part of a body, cut off at the planes of symmetry that it lists.
         points: Positions of its particles, shape (n, 3) [m].
         wall: Index of the contact line.
 
@@ -118,7 +118,7 @@ def whole_line(cloud: Cloud, count: int) -> tuple[Indices, Floats]:
     """Return the closed contact line around the whole body as images of an arc with ``count`` vertices.
 
     Args:
-        cloud: Cloud of the computed part, with its planes of symmetry.
+        cloud: Particles of the computed part of a body, cut off at the planes of symmetry that it lists.
         count: Number of vertices of the arc; the line is the arc itself without planes of symmetry.
 
     Returns:

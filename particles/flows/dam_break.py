@@ -80,7 +80,7 @@ def tank_points(scene: DamBreak, layers: int) -> Floats:
     """Return the wall particles of an open tank, four times as high as the column, shape (3, m) [m].
 
     Args:
-        scene: Dam break.
+        scene: Parameters of the dam break: column, tank, pressure sensor, liquid and numerics.
         layers: Number of particle layers in each wall.
     """
     spacing, length = scene.spacing, tank_columns(scene)
@@ -99,7 +99,7 @@ def dam_metrics(scene: DamBreak, history: dict[str, Floats]) -> Metrics:
     """Compute the metrics of a dam break.
 
     Args:
-        scene: Dam break.
+        scene: Parameters of the dam break: column, tank, pressure sensor, liquid and numerics.
         history: Samples over time, shape (n,), in the columns ``time`` [s], ``sensor_pressure`` [Pa],
             ``kinetic_energy``, ``potential_energy`` and ``elastic_energy``.
 

@@ -46,7 +46,7 @@ def solve_flow(scene: HasMethod, progress: Callable[[float], None], checkpoint: 
     """Compute a flow by the method of its scene.
 
     Args:
-        scene: Parameters of the flow.
+        scene: Parameters of the flow: liquid, sizes, effects and numerics.
         progress: Function called with the completed fraction, 0 to 1.
         checkpoint: Checkpoint to continue from, if its file exists, and to write.
 

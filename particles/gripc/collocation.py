@@ -55,7 +55,7 @@ def collocate(points: Floats, plates: Sequence[Plate], spacing: float, basis: st
         points: Particle positions, shape (n, 3) [m].
         plates: Walls, at which particles are mirrored; may be empty.
         spacing: Particle spacing [m].
-        basis: "linear" or "quadratic".
+        basis: Polynomial basis of the moving least squares fit, "linear" or "quadratic".
 
     Raises:
         DegenerateStencil: The derivatives at a particle cannot be fitted.

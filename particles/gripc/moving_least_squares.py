@@ -44,8 +44,8 @@ def fit_derivatives(points: Floats, rows: NDArray[np.int32], neighbours: Neighbo
     Args:
         points: Positions, shape (n, 3) [m].
         rows: Particles at which to fit, shape (m,).
-        neighbours: Neighbour list whose radius is the support of the weights.
-        basis: "linear" or "quadratic".
+        neighbours: Lists of the particles near each particle, within a radius that is the support of the weights.
+        basis: Polynomial basis of the moving least squares fit, "linear" or "quadratic".
 
     Raises:
         DegenerateStencil: A particle has too few neighbours, or they lie in a plane.
@@ -63,7 +63,7 @@ def fit_shape_functions(points: Floats, rows: NDArray[np.int32], neighbours: Nei
     Args:
         points: Positions, shape (n, 3) [m].
         rows: Particles at which to fit, shape (m,).
-        neighbours: Neighbour list whose radius is the support of the weights.
+        neighbours: Lists of the particles near each particle, within a radius that is the support of the weights.
 
     Returns:
         Sparse matrix, shape (m, n).

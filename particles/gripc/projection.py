@@ -47,11 +47,11 @@ def predict_velocity(operators: Operators, material: Material, velocity: Floats,
     matrix N^T m on both sides cancels. The stress on the free surface enters by its pressure only.
 
     Args:
-        operators: Operators at the particles.
+        operators: Sparse matrices for values, derivatives and smoothing at the particles.
         material: Density over the time step [kg/(m^3 s)], and viscosity [Pa s].
         velocity: Unsmoothed velocity v before the step, all x, all y, all z, shape (3 n,) [m/s].
         slope: Gradient of the last pressure in the same order, shape (3 n,) [Pa/m].
-        basis: "linear" or "quadratic".
+        basis: Polynomial basis of the moving least squares fit, "linear" or "quadratic".
 
     Raises:
         SolveFailed: The linear solve failed.

@@ -11,9 +11,13 @@ from numba import njit
 
 @njit(cache=True)
 def values(starts, columns, weights, field):
-    """Return N f at the particles, shape (n, d), of a field f on particles and ghosts, shape (n + g, d).
+    """Return the smoothed values N f of a field f at the particles, shape (n, d).
 
-    ``starts`` (n + 1,), ``columns`` (k,), ``weights`` (k, 4) are the rows of shape functions N and their derivatives.
+    Args:
+        starts: Start of each particle's row of shape functions N, shape (n + 1,).
+        columns: Particles and ghosts (mirror images, numbered from n) in the rows, shape (k,).
+        weights: Shape functions and their derivatives by x, y, z, shape (k, 4) [1, 1/m]; the first column is used.
+        field: Field with d components on the particles, then on the ghosts, shape (n + g, d).
     """
     result = np.zeros((starts.shape[0] - 1, field.shape[1]))
     for i in range(result.shape[0]):
@@ -25,9 +29,16 @@ def values(starts, columns, weights, field):
 
 @njit(cache=True)
 def spread(starts, columns, weights, parts, source):
-    """Distribute a scalar, ``parts`` (n,), to particles by shape functions, ghosts counting as their particles: (n,).
+    """Distribute a scalar of each particle to the particles in its row by shape functions: N^T parts, shape (n,).
 
-    ``source`` (g,) is the particle that each ghost mirrors; ``starts`` (n + 1,), ``columns`` (k,), ``weights`` (k, 4).
+    The share of a ghost (mirror image of a particle) goes to its particle, so that the sum is kept.
+
+    Args:
+        starts: Start of each particle's row of shape functions N, shape (n + 1,).
+        columns: Particles and ghosts (numbered from n) in the rows, shape (k,).
+        weights: Shape functions and their derivatives by x, y, z, shape (k, 4) [1, 1/m]; the first column is used.
+        parts: Scalar of each particle, e.g. its volume, shape (n,); not changed.
+        source: Particle that each ghost mirrors, shape (g,).
     """
     count = starts.shape[0] - 1
     result = np.zeros(count)
@@ -43,9 +54,12 @@ def lost_power(rows, fields, factors, walls):
     """Return the power in one velocity field of the forces that resist another one.
 
     Args:
-        rows: Starts (n + 1,), columns (k,) and weights (k, 4) of the shape functions N.
-        fields: Velocity that causes the forces and velocity in which they act, both with ghosts, (n + g, 3) [m/s].
-        factors: Coefficients of v - N v [kg/s], of N v [kg/s] and of twice the strain rate [N m s], shape (n, 3).
+        rows: Shape functions N, a tuple: start of each row, shape (n + 1,), particles and ghosts in the rows, shape
+            (k,), and values and derivatives by x, y, z, shape (k, 4) [1, 1/m].
+        fields: Velocity that causes the forces and velocity in which they act, a tuple; both on particles, then ghosts,
+            shape (n + g, 3) [m/s].
+        factors: Coefficients of each particle, shape (n, 3): of v - N v [kg/s] (smoothing), of N v [kg/s] (wall drag)
+            and of twice the strain rate [N m s] (viscosity times volume).
         walls: Wall velocities at the particles, shape (n, 3) [m/s].
 
     Returns:
@@ -72,7 +86,14 @@ def lost_power(rows, fields, factors, walls):
 
 @njit(cache=True)
 def velocity_gradient(starts, columns, weights, field):
-    """Return dv_c / dx_d (n, 3, 3) [1/s] of ``field`` (n + g, 3) [m/s]; starts (n + 1), columns (k), weights (k, 4)."""
+    """Return the velocity gradient at the particles, shape (n, 3, 3) [1/s]: entry (c, d) is dv_c / dx_d.
+
+    Args:
+        starts: Start of each particle's row of shape functions, shape (n + 1,).
+        columns: Particles and ghosts (mirror images, numbered from n) in the rows, shape (k,).
+        weights: Shape functions and their derivatives by x, y, z, shape (k, 4) [1, 1/m].
+        field: Velocity on particles, then on ghosts, shape (n + g, 3) [m/s].
+    """
     count = starts.shape[0] - 1
     gradient = np.empty((count, 3, 3))
     for i in range(count):
@@ -101,14 +122,15 @@ def resistance(starts, columns, weights, field, factors):
     """Return the forces of smoothing, wall drag and viscosity that resist a velocity field, in one pass over the rows.
 
     Args:
-        starts: Start of each row of the shape functions N, shape (n + 1,).
-        columns: Particles and ghosts in the rows, shape (k,).
+        starts: Start of each particle's row of shape functions N, shape (n + 1,).
+        columns: Particles and ghosts (mirror images, numbered from n) in the rows, shape (k,).
         weights: Shape functions and their derivatives by x, y, z, shape (k, 4) [1, 1/m].
-        field: Velocities v with ghosts, shape (n + g, 3) [m/s].
-        factors: Coefficients of v - N v [kg/s], of N v [kg/s] and of twice the strain rate [N m s], shape (n, 3).
+        field: Velocities v on particles, then on ghosts, shape (n + g, 3) [m/s].
+        factors: Coefficients of each particle, shape (n, 3): of v - N v [kg/s] (smoothing), of N v [kg/s] (wall drag)
+            and of twice the strain rate [N m s] (viscosity times volume).
 
     Returns:
-        Forces on particles and ghosts, shape (n + g, 3) [N].
+        Forces, positive along v (the liquid feels their negatives), on particles and ghosts, shape (n + g, 3) [N].
     """
     result = np.zeros(field.shape)
     for i in range(starts.shape[0] - 1):
@@ -140,7 +162,14 @@ def resistance(starts, columns, weights, field, factors):
 
 @njit(cache=True)
 def divergence(starts, columns, weights, field):
-    """Return the divergence (n,) [1/s] of velocities (n + g, 3) [m/s]; starts (n + 1), columns (k), weights (k, 4)."""
+    """Return the divergence of a velocity field at the particles, shape (n,) [1/s].
+
+    Args:
+        starts: Start of each particle's row of shape functions, shape (n + 1,).
+        columns: Particles and ghosts (mirror images, numbered from n) in the rows, shape (k,).
+        weights: Shape functions and their derivatives by x, y, z, shape (k, 4) [1, 1/m].
+        field: Velocity on particles, then on ghosts, shape (n + g, 3) [m/s].
+    """
     count = starts.shape[0] - 1
     result = np.empty(count)
     for i in range(count):
@@ -154,7 +183,15 @@ def divergence(starts, columns, weights, field):
 
 @njit(cache=True)
 def divergence_transposed(starts, columns, weights, factor, result):
-    """Add div^T ``factor`` (n,) [N m] to ``result`` (n + g, 3) [N]; starts (n + 1), columns (k), weights (k, 4)."""
+    """Add the transpose of ``divergence``, applied to a scalar of each particle, to forces.
+
+    Args:
+        starts: Start of each particle's row of shape functions, shape (n + 1,).
+        columns: Particles and ghosts (mirror images, numbered from n) in the rows, shape (k,).
+        weights: Shape functions and their derivatives by x, y, z, shape (k, 4) [1, 1/m].
+        factor: Scalar of each particle, pressure times volume, shape (n,) [N m].
+        result: Forces on particles, then on ghosts, shape (n + g, 3) [N]; changed in place.
+    """
     for i in range(starts.shape[0] - 1):
         f = factor[i]
         if f != 0.0:
@@ -167,9 +204,12 @@ def divergence_transposed(starts, columns, weights, factor, result):
 
 @njit(cache=True)
 def reflected(field, source, reflection):
-    """Append the reflected vectors of the ghosts to a vector field, shape (n, 3) to (n + g, 3).
+    """Return vectors of n particles, followed by their mirror images at g ghosts, shape (n + g, 3).
 
-    ``source`` (g,) is the particle that each ghost mirrors; ``reflection`` (g, 3, 3) maps its vector to the ghost.
+    Args:
+        field: Vectors of the particles, e.g. velocities, shape (n, 3); not changed.
+        source: Particle that each ghost mirrors, shape (g,).
+        reflection: Matrices that map the vector of the source to the ghost, shape (g, 3, 3).
     """
     count = field.shape[0]
     result = np.empty((count + source.shape[0], 3))
@@ -187,7 +227,17 @@ def reflected(field, source, reflection):
 
 @njit(cache=True)
 def folded(forces, source, reflection):
-    """Add ghost forces, turned by ``reflection`` (g, 3, 3), to particles ``source`` (g,): (n + g, 3) to (n, 3) [N]."""
+    """Return the forces on n particles, with the forces on their g ghosts added; the transpose of ``reflected``.
+
+    Args:
+        forces: Forces on particles, then on ghosts, shape (n + g, 3) [N]; not changed.
+        source: Particle that each ghost mirrors, shape (g,).
+        reflection: Matrices that map a vector of the source to the ghost, shape (g, 3, 3); their transposes are
+            applied.
+
+    Returns:
+        Forces, shape (n, 3) [N].
+    """
     count = forces.shape[0] - source.shape[0]
     result = forces[:count].copy()
     for g in range(source.shape[0]):

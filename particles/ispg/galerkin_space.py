@@ -200,5 +200,13 @@ class GalerkinSpace:
 
 
 def symmetry_planes(cloud: Cloud) -> list[Plate]:
-    """Return the planes of symmetry of a cloud as plates, to be mirrored like walls."""
+    """Return the planes of symmetry of a cloud as plates, so that particles can be mirrored at them as at walls.
+
+    Args:
+        cloud: Particles of the computed part of a body; its ``symmetry`` lists the axes, 0 for the plane x = 0 and 1
+            for y = 0.
+
+    Returns:
+        One plate for each plane, in the order of the axes; empty without symmetry.
+    """
     return [Plate(np.zeros(3), np.roll(np.eye(3), 2 - axis, axis=0)) for axis in cloud.symmetry]

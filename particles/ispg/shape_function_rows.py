@@ -18,14 +18,18 @@ ROWS = 64  # rows that share work arrays
 def supports(rows, points, lists, spacing):
     """Return the squared support radius of some particles, and the number of points within it.
 
+    The support is a ball of two spacings, or a wider one that holds at least 16 neighbours.
+
     Args:
-        rows: Numbers of the particles, shape (m,).
-        points: Positions of n particles, then of g ghosts, shape (n + g, 3) [m].
-        lists: Offsets (n + 1,) and indices (k,) of the neighbours, and the radius of the search, a scalar [m].
-        spacing: Particle spacing, scalar [m]; the support is two spacings, or wider to hold 16 neighbours.
+        rows: Numbers of the particles whose support is computed, integers, shape (m,).
+        points: Positions of n particles, then of g ghost particles (mirror images at walls), shape (n + g, 3) [m].
+        lists: Tuple of three: start of each particle's neighbours, shape (n + 1,); neighbour numbers, shape (k,);
+            radius within which these neighbours were searched, a scalar [m].
+        spacing: Particle spacing, a scalar [m].
 
     Returns:
-        Squared radii, zero where the search found too few points, shape (m,) [m^2], and numbers of points, shape (m,).
+        Squared support radii, zero where the search radius was too small for 16 neighbours, shape (m,) [m^2]; numbers
+        of points in the support, the particle itself included, shape (m,).
     """
     offsets, indices, reach = lists
     squares, lengths = np.zeros(rows.shape[0]), np.ones(rows.shape[0], np.int64)
@@ -78,10 +82,17 @@ def _square_of_the_fewest(points, i, neighbours):
 
 @njit(cache=True)
 def with_rows(lists, rows, others):
-    """Return neighbour lists, offsets (n + 1,) and indices (k,), with some rows replaced.
+    """Return new neighbour lists in which the rows of some particles are replaced.
 
-    ``lists`` are the old offsets and indices, ``rows`` (m,) the particles whose rows change, ``others`` the offsets
-    (m + 1,) and indices of their new rows. A particle itself is left out of its row.
+    A row lists the neighbours of one particle; the particle itself is left out of it. No argument is changed.
+
+    Args:
+        lists: Old lists, a tuple: start of each row, shape (n + 1,), and neighbour numbers, shape (k,).
+        rows: Numbers of the particles whose rows are replaced, integers, shape (m,).
+        others: Their new rows, a tuple: start of each row, shape (m + 1,), and neighbour numbers, shape (l,).
+
+    Returns:
+        Start of each row, shape (n + 1,), and neighbour numbers.
     """
     (offsets, indices), (starts, replacements) = lists, others
     number = np.full(offsets.shape[0] - 1, -1)
@@ -161,20 +172,22 @@ def _weights(places, count, solved, result):
 
 @njit(cache=True, parallel=True)
 def shape_rows(points, lists, squares, starts, shares):
-    """Return the columns and weights of all rows, and the particle densities.
+    """Compute the linear MLS shape functions psi_J and their gradients at all particles, and the particle densities.
 
     psi_J = w_J b . p_J with M b = (1, 0, 0, 0); psi_J,c = w_J b,c . p_J + w_J,c b . p_J with M b,c = e_c - M,c b.
 
     Args:
-        points: Positions of n particles, then of g ghosts, shape (n + g, 3) [m].
-        lists: Offsets (n + 1,) and indices of the neighbours.
-        squares: Squared support radii, shape (n,) [m^2].
-        starts: Start of each row, shape (n + 1,).
-        shares: Share with which each point counts in the density, shape (n + g,).
+        points: Positions of n particles, then of g ghost particles (mirror images at walls), shape (n + g, 3) [m].
+        lists: Neighbours of each particle, a tuple: start of each row, shape (n + 1,), and neighbour numbers without
+            the particle itself.
+        squares: Squared support radii, shape (n,) [m^2]; neighbours beyond are left out.
+        starts: Start of each row of the result, shape (n + 1,): cumulated numbers of points in the supports.
+        shares: Weight with which each point counts in the density, 0 to 1, shape (n + g,).
 
     Returns:
-        Columns, shape (k,); weights psi, psi,x, psi,y, psi,z, shape (k, 4) [1, 1/m]; densities up to a constant factor,
-        zero where M is singular, shape (n,) [1/m^3].
+        Points in the rows, the particle itself first, shape (k,); weights psi [1] and their derivatives by x, y, z
+        [1/m], shape (k, 4); densities up to a constant factor, shape (n,) [1/m^3], zero where the neighbours lie in a
+        plane.
     """
     offsets, indices = lists
     count, longest = squares.shape[0], np.diff(starts).max()

@@ -78,7 +78,7 @@ def effect_problems(solder: Solder, effects: Mapping[str, Decision]) -> list[Pro
     """Find solder that never comes to rest because neither surface tension nor inertia acts.
 
     Args:
-        solder: Solder of the case.
+        solder: Solder of the case: volume, fluid, contact angles and numerics.
         effects: Name -> decision; ``surface_tension`` and ``inertia`` are used.
 
     Returns:

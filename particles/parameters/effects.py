@@ -86,7 +86,7 @@ def acting(effects: Mapping[str, bool]) -> Iterator[LiquidEffect]:
     """Yield the effects that are on, in the order in which they are added to the physics.
 
     Args:
-        effects: Name -> on or off; missing effects are off.
+        effects: Name of an effect, such as "inertia" -> on or off; missing effects are off.
 
     Raises:
         KeyError: A name is unknown.

@@ -123,7 +123,7 @@ def wall_areas(body: Body, space: Discretisation) -> Floats:
     includes faces of the free surface, which are subtracted.
 
     Args:
-        body: Liquid body.
+        body: Liquid body: particles, triangles of its free surface, and plates.
         space: Discretisation of the body, with the volume gradients of its particles.
     """
     corners = body.points[body.triangles]

@@ -308,7 +308,7 @@ def empty_ground(scene: Printing, spacing: float) -> LevelSet:
     """Return a level set without solid bodies on a grid around the whole print.
 
     Args:
-        scene: Printing parameters.
+        scene: Parameters of the print: drops, their positions and order, ink, curing and numerics.
         spacing: Particle spacing [m].
     """
     places = np.array(scene.places())

@@ -86,7 +86,7 @@ def part_of(scene: Printing, deposit: Deposit) -> Part:
     """Assemble the printed part from the solid bodies of a deposit.
 
     Args:
-        scene: Printing parameters.
+        scene: Parameters of the print: drops, their positions and order, ink, curing and numerics.
         deposit: State of the print after its last drop.
 
     Returns:
@@ -161,7 +161,7 @@ def measure_part(scene: Printing, deposit: Deposit, part: Part) -> Metrics:
     """Return the metrics of a printed part: name -> (value, unit).
 
     Args:
-        scene: Printing parameters.
+        scene: Parameters of the print: drops, their positions and order, ink, curing and numerics.
         deposit: State of the print after its last drop, with its particles.
         part: Printed part that ``part_of`` returned.
 

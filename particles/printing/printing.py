@@ -87,7 +87,7 @@ def solve_printing(
     it also detects one drop that splashes among many.
 
     Args:
-        scene: Printing parameters.
+        scene: Parameters of the print: drops, their positions and order, ink, curing and numerics.
         progress: Called with the fraction of drops that are solid.
         checkpoint: Checkpoint to continue from and to write.
 

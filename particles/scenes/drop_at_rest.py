@@ -57,7 +57,7 @@ def drop_to_rest(
     """Compute a drop at rest and compare it with its exact shape.
 
     Args:
-        drop: Volume, wall, resolution and initial motion.
+        drop: Scene of the drop: volume, wall, resolution and initial motion.
         solder: Fluid and process, with the volume of the drop.
         progress: Function called with the fraction done, 0 to 1.
         checkpoint: File from which the run continues, to the last bit, and to which it saves its state.

@@ -30,7 +30,7 @@ def start_flow(cloud: Cloud, solder: Solder, effects: Mapping[str, bool], lines:
     Args:
         cloud: Particles of the liquid.
         solder: Fluid properties and numerics, which select the step solver.
-        effects: Name -> on or off; missing effects are off.
+        effects: Name of an effect, such as "inertia" -> on or off; missing effects are off.
         lines: Contact lines, one per ring of the cloud; empty for a free drop.
 
     Returns:
@@ -102,7 +102,7 @@ def stop_rule(cloud: Cloud, solder: Solder, effects: Mapping[str, bool], angle: 
     Args:
         cloud: Particles of the liquid.
         solder: Fluid, process and numerics.
-        effects: Name -> on or off; missing effects are off.
+        effects: Name of an effect, such as "inertia" -> on or off; missing effects are off.
         angle: Contact angle [rad] of the spherical cap that oscillates as slowly as the body: the contact angle of a
             drop on a uniform wall; the default for a body that edges or friction hold; None for a free drop.
     """

@@ -52,7 +52,7 @@ def joint_to_rest(
     """Compute the solder of a joint, and a floating package, at rest.
 
     Args:
-        joint: Volume, pads, package and resolution.
+        joint: Scene of the joint: volume, pads, package and resolution.
         solder: Fluid and process, with the volume of the joint.
         progress: Function called with the fraction done, 0 to 1.
         checkpoints: Function of the number of a target of the path that returns its checkpoint; joints without a path

@@ -59,8 +59,8 @@ def drop_metrics(solder: Solder, pad_radius: float, flow: LiquidFlow, run: Run) 
     Args:
         solder: Volume, contact angles and fluid.
         pad_radius: Radius of the pad [m], infinite for a uniform wall.
-        flow: Flow at the end of the run.
-        run: Records of the steps.
+        flow: Flow at the end of the run: body, physics and time.
+        run: Steps of the run: a record and a profile of each, and snapshots.
 
     Returns:
         Metrics of ``body_metrics``: name -> (SI value, unit; angles in deg).

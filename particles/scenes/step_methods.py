@@ -63,7 +63,7 @@ def step_method(solder: Solder, effects: Mapping[str, bool]) -> StepMethod:
 
     Args:
         solder: Solder with the selected scheme.
-        effects: Name -> on or off; missing effects are off.
+        effects: Name of an effect, such as "inertia" -> on or off; missing effects are off.
 
     Returns:
         Method with its name and the functions that build its step solver and its events.
@@ -76,7 +76,7 @@ def start_solver(solder: Solder, effects: Mapping[str, bool], physics: Physics) 
 
     Args:
         solder: Fluid and numerics, with the selected scheme.
-        effects: Name -> on or off; missing effects are off.
+        effects: Name of an effect, such as "inertia" -> on or off; missing effects are off.
         physics: Physics of the active effects; not changed.
     """
     method = step_method(solder, effects)

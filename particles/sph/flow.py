@@ -152,7 +152,7 @@ def law_of(scene: FlowScene, periods: Vector, gravity: Vector, has_surface: bool
     """Return the parameters of the pair interactions of a flow in the plane of x and z.
 
     Args:
-        scene: Parameters of the flow.
+        scene: Parameters of the flow: liquid, sizes, effects and numerics.
         periods: Periods along x, y and z [m]; 0 if not periodic.
         gravity: Gravity along x, y and z [m/s^2].
         has_surface: Whether the liquid has a free surface, near which particles cannot be shifted.
@@ -234,7 +234,7 @@ def make_fields(liquid: Floats, walls: Floats, pressure: Floats, law: Law) -> Fi
         liquid: Positions of the liquid particles, shape (3, n) [m].
         walls: Positions of the wall particles, shape (3, m) [m].
         pressure: Pressures of the liquid particles, shape (n,) [Pa].
-        law: Parameters of the pair interactions.
+        law: Parameters of the pair interactions, such as kernel, smoothing length and density.
     """
     points = np.concatenate((liquid, walls), axis=1)
     count, fixed = points.shape[1], walls.shape[1]

@@ -33,9 +33,9 @@ def temperature_laplacian(i, neighbours, fields, temperatures, law):
     Args:
         i: Number of the particle, integer.
         neighbours: Numbers of its neighbours, shape (k,), which include itself because of its image.
-        fields: ``Fields`` of all particles.
+        fields: ``Fields``: arrays of position, velocity, density, pressure and mass of all particles, liquid first.
         temperatures: Temperatures of all particles, row 0, and of their mirror images, row 1, shape (2, n) [K].
-        law: ``Law`` of the particles.
+        law: ``Law``: constants of the particles, such as kernel, smoothing length, density and speed of sound.
     """
     x, y, z, temperature = fields.x[i], fields.y[i], fields.z[i], temperatures[0, i]
     periods, (line, inverse, scale, softening, _) = periods_of(law), constants_of(law)

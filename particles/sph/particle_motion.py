@@ -13,7 +13,7 @@ def predict(i, fields, rates, middle, time_step):
 
     Args:
         i: Number of the particle, integer.
-        fields: ``Fields`` of all particles.
+        fields: ``Fields``: arrays of position, velocity, density, pressure and mass of all particles, liquid first.
         rates: Rates, shape (10, n): density rate [kg/(m^3 s)], acceleration (3) [m/s^2], density gradient (3) [kg/m^4],
             concentration gradient (3) [1/m].
         middle: Values in the middle of the step, shape (7, n); velocity (3) [m/s] and density [kg/m^3] are written to
@@ -41,7 +41,7 @@ def settle(i, fields, middle, law):
         i: Number of the particle, integer.
         fields: ``Fields`` of all particles; those of particle i change.
         middle: Values in the middle of the step, shape (7, n), whose velocity along z, row 2, is reflected, too.
-        law: ``Law`` of the particles.
+        law: ``Law``: constants of the particles, such as kernel, smoothing length, density and speed of sound.
     """
     middle[2, i] *= reflect(i, fields, law)
     fields.pressure[i] = law.sound * law.sound * (fields.density[i] - law.rest_density)
@@ -108,7 +108,7 @@ def shift(i, fields, rates, factor, law):
         rates: Rates, shape (10, n): density rate [kg/(m^3 s)], acceleration (3) [m/s^2], density gradient (3) [kg/m^4],
             concentration gradient (3) [1/m]; rows 7 to 9 are used.
         factor: Factor of the gradient, a scalar [m^2].
-        law: ``Law`` of the particles.
+        law: ``Law``: constants of the particles, such as kernel, smoothing length, density and speed of sound.
     """
     fields.x[i] -= factor * rates[7, i]
     fields.y[i] -= factor * rates[8, i]
@@ -131,7 +131,7 @@ def cover(k, i, fields, found, law):
         i: Number among all particles, integer.
         fields: ``Fields`` of all particles; changed in place.
         found: Pressure [Pa], velocity along x, y, z [m/s] and weight (0 to 1) of the particle, a tuple of five scalars.
-        law: ``Law`` of the particles.
+        law: ``Law``: constants of the particles, such as kernel, smoothing length, density and speed of sound.
     """
     pressure, u, v, w, share = found
     fields.pressure[i], fields.u[i], fields.v[i], fields.w[i], fields.wall_share[k] = pressure, u, v, w, share

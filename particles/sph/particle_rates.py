@@ -60,7 +60,7 @@ def apart(place, j, side, fields, periods):
         place: Position (x, y, z) [m].
         j: Number of the particle, integer.
         side: 1 for the particle, -1 for its image behind the plane z = 0.
-        fields: ``Fields`` of all particles.
+        fields: ``Fields``: arrays of position, velocity, density, pressure and mass of all particles, liquid first.
         periods: Pairs (period [m], 1 / period [1/m]) for x, y and z, (0, 0) if not periodic.
     """
     dx = across(place[0] - fields.x[j], periods[0])
@@ -98,7 +98,7 @@ def closing_in(k, velocity, d, fields):
         k: Number among the wall particles, integer.
         velocity: Velocity u_i (x, y, z) [m/s].
         d: Vector (x, y, z) from the wall particle to i [m].
-        fields: ``Fields`` of all particles.
+        fields: ``Fields``: arrays of position, velocity, density, pressure and mass of all particles, liquid first.
     """
     u, v, w = velocity[0] - fields.wall_u[k], velocity[1] - fields.wall_v[k], velocity[2] - fields.wall_w[k]
     closing = u * d[0] + v * d[1] + w * d[2]
@@ -127,8 +127,8 @@ def rates_of(i, fluids, neighbours, fields, law):
         i: Number of the particle, integer.
         fluids: Number of liquid particles, integer.
         neighbours: Numbers of its neighbours, liquid ones first, shape (k,).
-        fields: ``Fields`` of all particles.
-        law: ``Law`` of the particles.
+        fields: ``Fields``: arrays of position, velocity, density, pressure and mass of all particles, liquid first.
+        law: ``Law``: constants of the particles, such as kernel, smoothing length, density and speed of sound.
 
     Returns:
         Rate of density [kg/(m^3 s)], acceleration (3) [m/s^2], density gradient (3) [kg/m^4], gradient of the

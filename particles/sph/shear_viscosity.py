@@ -46,7 +46,7 @@ def viscosity_of(i, fluids, neighbours, fields, law):
         i: Number of the particle, integer.
         fluids: Number of liquid particles, integer.
         neighbours: Numbers of its neighbours, liquid ones first, shape (k,).
-        fields: ``Fields`` of all particles.
+        fields: ``Fields``: arrays of position, velocity, density, pressure and mass of all particles, liquid first.
         law: ``Law`` of the particles, with the viscosity law.
     """
     x, y, z, u, v, w = fields.x[i], fields.y[i], fields.z[i], fields.u[i], fields.v[i], fields.w[i]

@@ -129,8 +129,8 @@ def find_weights(points, lists, fields, law, weights):
     Args:
         points: Vertices, shape (m, 3) [m].
         lists: Particles near each vertex in compressed rows: offsets, shape (m + 1,), and indices, shape (pairs,).
-        fields: ``Fields`` of the particles.
-        law: ``Law`` of the particles.
+        fields: ``Fields``: arrays of position, velocity, density, pressure and mass of all particles, liquid first.
+        law: ``Law``: constants of the particles, such as kernel, smoothing length, density and speed of sound.
         weights: Output, shape (2, 2, pairs). ``weights[1]`` is W [1/m^3], mirror images added (``[1, 0]``, for
             components along the wall z = 0) or subtracted (``[1, 1]``, across it); ``weights[0]`` is the same over the
             sum of W at the vertex. Without a particle within the support the nearest one has the whole weight.
@@ -212,7 +212,7 @@ def find_distances_to_cover(vertices, lists, fields, cover, distances):
     Args:
         vertices: Points, shape (m, 3) [m], and outward unit normals, shape (m, 3); a tuple.
         lists: Particles near each vertex in compressed rows: offsets, shape (m + 1,), and indices, shape (pairs,).
-        fields: ``Fields`` of the particles.
+        fields: ``Fields``: arrays of position, velocity, density, pressure and mass of all particles, liquid first.
         cover: Four scalars: least and largest distance of the surface beyond a particle [m]; half the curvature of the
             surface about a particle [1/m]; distance outside a vertex from which on particles are left out [m].
         distances: Output, shape (m,) [m], positive outwards.

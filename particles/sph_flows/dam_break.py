@@ -23,7 +23,7 @@ def solve_dam_break(
     """Compute a dam break.
 
     Args:
-        scene: Dam break.
+        scene: Parameters of the dam break: column, tank, pressure sensor, liquid and numerics.
         progress: Function called with the completed fraction, 0 to 1.
         checkpoint: Checkpoint to continue from, if its file exists, and to write.
 

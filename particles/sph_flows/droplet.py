@@ -40,7 +40,7 @@ def solve_droplet(
     """Compute the motion of a droplet from its start.
 
     Args:
-        scene: Droplet.
+        scene: Parameters of the droplet: liquid, size, wall, speed, effects and numerics.
         progress: Function called with the completed fraction, 0 to 1.
         checkpoint: Checkpoint to continue from, if its file exists, and to write.
 
@@ -61,7 +61,7 @@ def follow(
     """Compute the motion of a droplet from the state of a simulation, which is advanced in place.
 
     Args:
-        scene: Droplet.
+        scene: Parameters of the droplet: liquid, size, wall, speed, effects and numerics.
         simulation: Particles and surface, as ``droplet`` returns them.
         progress: Function called with the completed fraction, 0 to 1.
         checkpoint: Checkpoint to continue from, if its file exists, and to write.
@@ -104,7 +104,7 @@ def liquid_of(scene: Droplet, spacing: float) -> tuple[Law, float]:
     """Return the law of a droplet in space and its surface tension.
 
     Args:
-        scene: Droplet.
+        scene: Parameters of the droplet: liquid, size, wall, speed, effects and numerics.
         spacing: Particle spacing [m].
 
     Returns:

@@ -21,7 +21,7 @@ def solve_poiseuille(
     """Compute the start of channel flow and its error against the exact speeds.
 
     Args:
-        scene: Channel.
+        scene: Parameters of the channel flow: width, speed, duration, liquid and numerics.
         progress: Function called with the completed fraction, 0 to 1.
         checkpoint: Checkpoint to continue from, if its file exists, and to write.
 
@@ -70,7 +70,7 @@ def solve_taylor_green(
     """Compute decaying vortices in a periodic box and their error against the exact speeds.
 
     Args:
-        scene: Vortices.
+        scene: Parameters of the vortices: side of the box, speed, duration, liquid and numerics.
         progress: Function called with the completed fraction, 0 to 1.
         checkpoint: Checkpoint to continue from, if its file exists, and to write.
 

@@ -123,8 +123,8 @@ def highest_energy(body: Body, physics: Physics, solver: StepSolver, time_step: 
     energy.
 
     Args:
-        body: Liquid body.
-        physics: Effects that act on the body.
+        body: Liquid body: particles, triangles of its free surface, and plates.
+        physics: Effects that act on the body: forces, friction, contact lines and motions of plates.
         solver: Step solver.
         time_step: Time step [s].
     """
@@ -154,7 +154,7 @@ def smooth_surface(body: Body, physics: Physics, volume: float, smoothing: MeshS
     """Flip edges and smooth the surface as far as the energy permits, correct the volume, and stop lines at edges.
 
     Args:
-        body: Liquid body; changed in place.
+        body: Liquid body: particles, triangles of its free surface, and plates; changed in place.
         physics: Effects that act on the body, with contact lines, whose pinning changes.
         volume: Enclosed volume [m^3].
         smoothing: Passes, flips and the highest energy.

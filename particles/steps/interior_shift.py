@@ -71,7 +71,7 @@ def interior_shift(body: Body, neighbours: NeighbourList, normals: Floats) -> Fl
     """Return the shifts of the m particles below the surface, within the wall for those on one, shape (m, 3) [m].
 
     Args:
-        body: Liquid body.
+        body: Liquid body: particles, triangles of its free surface, and plates.
         neighbours: Valid neighbour list with a radius of at least 1.1 spacings.
         normals: Outward unit normals at the vertices of the surface, shape (s, 3).
     """

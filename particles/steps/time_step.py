@@ -40,7 +40,7 @@ def swing_period(solder: Solder, angle: float | None = None) -> float:
     """Return the period of the slowest mode of a drop of all the solder [s].
 
     Args:
-        solder: Solder of the case.
+        solder: Solder of the case: volume, fluid, contact angles and numerics.
         angle: Contact angle of a drop on a wall [rad]; None for a free drop.
     """
     if angle is not None:

@@ -14,7 +14,7 @@ def settle_on_ground(ground: LevelSet, points: Floats, outward: Floats, near: fl
     """Move vertices that have reached the ground onto it.
 
     Args:
-        ground: Distance to the ground [m].
+        ground: Level set of the solid ground: distances at the nodes of a grid [m], negative inside it.
         points: Vertices of the surface, shape (m, 3) [m]; changed in place.
         outward: Outward normals of the vertices, shape (m, 3).
         near: Distance below which a vertex that faces the ground lies on it [m]; between it and twice it partly so.
@@ -40,7 +40,7 @@ def reflect_at_ground(ground: LevelSet, points: Floats, vectors: Floats, reach: 
     """Return the mirror images of points and of vectors at them behind the face of the ground.
 
     Args:
-        ground: Distance to the ground [m].
+        ground: Level set of the solid ground: distances at the nodes of a grid [m], negative inside it.
         points: Points, shape (m, 3) [m].
         vectors: Vectors at the points, shape (m, 3).
         reach: Distance beyond which a point has no image [m]; it is returned as it is, with a vector of zero.

@@ -54,7 +54,7 @@ def signed_distance(points: Floats, triangles: Indices, grid: Grid) -> LevelSet:
     Args:
         points: Vertices, shape (n, 3) [m].
         triangles: Outward oriented triangles, shape (t, 3), that share the vertices of their edges.
-        grid: Grid of nodes.
+        grid: Regular grid of nodes: origin, spacing and numbers of nodes.
     """
     import pyvista  # most reflows need no level set, and start without it
 
@@ -69,7 +69,7 @@ def signed_distance_in_band(points: Floats, triangles: Indices, grid: Grid, band
     Args:
         points: Vertices, shape (n, 3) [m].
         triangles: Outward oriented triangles, shape (t, 3), that share the vertices of their edges.
-        grid: Grid of nodes.
+        grid: Regular grid of nodes: origin, spacing and numbers of nodes.
         band: Largest magnitude [m]; nodes farther from the surface get it with the sign of their side.
     """
     distance = np.full(grid.shape, band)
@@ -103,7 +103,7 @@ def winding_numbers_on(grid: Grid, points: Floats, triangles: Indices) -> Indice
     """Return the winding numbers of a closed surface at the nodes of a grid, shape (i, j, k): 1 inside, 0 outside.
 
     Args:
-        grid: Grid of nodes.
+        grid: Regular grid of nodes: origin, spacing and numbers of nodes.
         points: Vertices, shape (n, 3) [m].
         triangles: Outward oriented triangles, shape (t, 3).
     """

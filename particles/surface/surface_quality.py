@@ -180,7 +180,7 @@ def flip_to_delaunay(
     Args:
         points: Points, shape (n, 3) [m].
         triangles: Triangles, shape (t, 3).
-        rings: Contact lines.
+        rings: Contact lines as vertices in order, shape (k,) each; may be empty.
         worth: Angle by which the Delaunay criterion is relaxed for each triangle that a flip moves from vertices with
             more than six to vertices with fewer [rad].
 
