@@ -85,7 +85,11 @@ class Plate:
 
 
 def joint_plates(geometry: JointGeometry) -> tuple[Plate, Plate]:
-    """Return the board's plate at z = 0 and the package's plate with its offset and tilt."""
+    """Return the board's plate at z = 0 and the package's plate at its gap, with its offset and tilt, in this order.
+
+    Args:
+        geometry: Gap, offset and tilt of the package's disc; the radii are ignored.
+    """
     package = Plate.horizontal(geometry.gap, geometry.offset, side=1.0)
     return Plate.horizontal(0.0), package.moved(np.array([0.0, 0.0, 0.0, *geometry.tilt, 0.0]))
 

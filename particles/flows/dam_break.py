@@ -77,7 +77,9 @@ def column_points(scene: DamBreak) -> Floats:
 
 
 def tank_points(scene: DamBreak, layers: int) -> Floats:
-    """Return the wall particles of an open tank, four times as high as the column, shape (3, m) [m].
+    """Return the positions of the wall particles of an open tank, rows x, y, z of shape (3, m) [m].
+
+    The tank is four times as high as the column.
 
     Args:
         scene: Parameters of the dam break: column, tank, pressure sensor, liquid and numerics.
@@ -91,7 +93,11 @@ def tank_points(scene: DamBreak, layers: int) -> Floats:
 
 
 def tank_columns(scene: DamBreak) -> int:
-    """Return the length of the tank in spacings."""
+    """Return the length of the tank in particle spacings, rounded to an integer.
+
+    Args:
+        scene: Length of the tank and particle spacing.
+    """
     return round(scene.tank_length / scene.spacing)
 
 

@@ -98,6 +98,9 @@ def rest_metrics(scene: Droplet) -> tuple[str, ...]:
 
     They are pressure and roundness of a free drop, base and height on a wall; empty for a drop with weight, an impact,
     or a bounded scene.
+
+    Args:
+        scene: Parameters of the droplet, of which wall, weight, speed and hysteresis decide.
     """
     if not scene.has_wall:
         return ("pressure_error", "roundness")

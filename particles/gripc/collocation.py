@@ -57,6 +57,10 @@ def collocate(points: Floats, plates: Sequence[Plate], spacing: float, basis: st
         spacing: Particle spacing [m].
         basis: Polynomial basis of the moving least squares fit, "linear" or "quadratic".
 
+    Returns:
+        Operators: sparse matrices, shape (n, n) for scalars and (3 n, 3 n) for velocities, that give values, gradient,
+        Laplacian, divergence [1/m, 1/m^2] and smoothed velocities from coefficients at the particles.
+
     Raises:
         DegenerateStencil: The derivatives at a particle cannot be fitted.
     """

@@ -163,7 +163,7 @@ def smooth_velocities(last: Velocities, coefficients: Floats, smoothing: sparse.
 def solve_gmres(matrix: sparse.csr_matrix, right: Floats, basis: str) -> tuple[Floats, int]:
     """Solve A x = b by GMRES with rows scaled by their largest entry.
 
-    The preconditioner is algebraic multigrid, or an LU factorisation for the linear basis.
+    The preconditioner is algebraic multigrid for the quadratic basis, and an LU factorisation for the linear one.
 
     Args:
         matrix: Matrix A, shape (d, d).

@@ -62,7 +62,7 @@ def scheme_problems(solder: Solder) -> list[Problem]:
 
 
 def ispg_problems(solder: Solder, place: str | None) -> list[Problem]:
-    """Find the use of the scheme ispg where it is not verified; no or one input error.
+    """Find the use of the scheme ispg for a scene where it is not verified; return no or one input error.
 
     Args:
         solder: Solder with the selected scheme; other schemes have no problem.

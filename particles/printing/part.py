@@ -87,7 +87,7 @@ def part_of(scene: Printing, deposit: Deposit) -> Part:
 
     Args:
         scene: Parameters of the print: drops, their positions and order, ink, curing and numerics.
-        deposit: State of the print after its last drop.
+        deposit: State of the print after its last drop: solid bodies, ink and particles.
 
     Returns:
         Surface, height map, layers and voids; gaps narrower than the resolution are closed.
@@ -166,8 +166,9 @@ def measure_part(scene: Printing, deposit: Deposit, part: Part) -> Metrics:
         part: Printed part that ``part_of`` returned.
 
     Returns:
-        Number of drops, errors of the volume, largest number of separate bodies, roughness, heights, footprint and
-        voids.
+        ``drops``, ``volume_error``, ``volume_drift``, ``part_volume`` [m^3], ``connected_parts_max`` (largest number of
+        separate bodies), ``roughness_sa``, ``roughness_sz``, ``height_mean``, ``height_max``, ``layer_rise_min`` [m],
+        ``footprint`` [m^2], ``voids`` (their number) and ``void_volume`` [m^3], among others.
     """
     printed = scene.drops * scene.drop_volume
     bodies = sum(layer.volume for layer in part.layers)
