@@ -152,7 +152,7 @@ def _area_vector(points: Floats, ring: Indices) -> Floats:
 
 
 def ring_area(points: Floats, ring: Indices) -> float:
-    """Return the area of the polygon within a contact line, projected onto the plane z = 0 [m^2].
+    """Return the area of the plane polygon that a contact line encloses, in a plane of any orientation [m^2].
 
     Args:
         points: Positions, shape (n, 3) [m].

@@ -95,7 +95,7 @@ def joint_to_rest(
 
 
 def floating(package: FloatingPackage) -> Floating:
-    """Return the motion of a floating package: the plate 1 under its load [N], free in the directions of the case.
+    """Return the motion of a floating package: plate 1 of the joint under a load [N], with its free directions.
 
     Args:
         package: Package with the force that presses it down [N] and the names of its free directions (lift, shift,

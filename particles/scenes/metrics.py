@@ -89,7 +89,7 @@ def body_metrics(solder: Solder, reference: Meridian | None, flow: LiquidFlow, r
 def with_shape_error(
     shape: JointShape, solder: Solder, reference: Meridian | None, surface: Body | None = None
 ) -> JointShape:
-    """Add the metric ``shape_error``: the RMS distance to the reference over the cube root of the volume.
+    """Return a copy with the metric ``shape_error``: RMS distance to the reference over the cube root of the volume.
 
     Args:
         shape: Shape at rest.
@@ -170,7 +170,7 @@ def _reference_weight(flow: LiquidFlow) -> float | None:
 
 
 def particle_pressure(flow: LiquidFlow) -> Floats:
-    """Return the pressure of the particles above ambient, including the hydrostatic part, shape (n,) [Pa].
+    """Return the pressure above ambient at the particles of a flow's body, hydrostatic part included, shape (n,) [Pa].
 
     Gravity acts as a surface force, so the pressure of the solver lacks the hydrostatic part.
     """
@@ -183,7 +183,7 @@ def particle_pressure(flow: LiquidFlow) -> Floats:
 
 
 def contact_radius(body: Body, wall: int) -> float:
-    """Return the radius of a disc with the wetted area of a wall [m]."""
+    """Return the radius of a disc with the area that a body wets on a wall, given by its index [m]."""
     line = whole_points(body.cloud, body.points, wall)[0]
     return float(np.sqrt(ring_area(line, np.arange(len(line), dtype=np.int32)) / np.pi))
 
@@ -194,7 +194,7 @@ def mean_angle(cosines: Floats) -> float:
 
 
 def verdict(lines: Sequence[ContactLine], ruptured: bool) -> str:
-    """Return the verdict on a joint or drop, the first that applies.
+    """Return the verdict on a joint or drop with some contact ``lines``, the first that applies of:
 
     "open" (neck ruptured), "bridged" (line on several pads), "overflow" (on the mask), "dewetted" (off the edge), "ok".
     """
@@ -262,7 +262,7 @@ def _width_error(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run:
 
 
 def axial_force(flow: LiquidFlow) -> float:
-    """Return the force of the liquid on the package along +z [N]."""
+    """Return the force of the liquid on the package (the second plate of the flow's body) along +z [N]."""
     on_package = [wall for wall, plate in enumerate(flow.body.plates) if plate.side > 0.0]
     return float(sum(plate_wrench(flow.body, _others(flow), wall)[2] for wall in on_package))
 
@@ -322,10 +322,10 @@ def particles_lost(body: Body) -> int:
 
 
 def energy_metrics(flows: Sequence[LiquidFlow]) -> Metrics:
-    """Return the metrics of the energy budget: losses by cause over the initial energy, and the imbalance.
+    """Return the metrics of the energy budget, name -> (value, unit): losses by cause, imbalance, sliding speed.
 
-    Losses of all bodies are added. The result is empty for schemes without a budget, that is all but ispg. It includes
-    the sliding speed [m/s], since a body may slide on smooth walls for ever.
+    Losses of all ``flows`` are added; they and the imbalance are over the initial energy. Only the scheme ispg has a
+    budget; the result is empty for others. A body may slide on smooth walls for ever.
     """
     moved = [(flow, flow.solver.state, flow.solver.first_energy) for flow in flows if isinstance(flow.solver, IspgStep)]
     started = [(flow, state, first) for flow, state, first in moved if state is not None]

@@ -126,11 +126,11 @@ def write_particles(path: Path | str, shape: JointShape) -> None:
 
 
 def write_flow(folder: Path, result: FlowResult) -> None:
-    """Write a flow: pictures, history and metrics without timings to ``flow.h5``, its end to ``particles.vtu``.
+    """Write a flow: pictures, history and metrics without timings to ``flow.h5``, final state to ``particles.vtu``.
 
     Args:
         folder: Existing folder; both files are replaced.
-        result: Result of the flow.
+        result: Result of the flow: pictures, history and metrics.
     """
     with h5py.File(folder / FLOW, "w") as file:
         file["walls"] = result.walls
@@ -151,7 +151,11 @@ def write_flow(folder: Path, result: FlowResult) -> None:
 
 
 def read_flow(folder: Path) -> FlowResult:
-    """Read the file ``flow.h5`` of ``write_flow`` in a folder; timings and texts are not in the file."""
+    """Read the file ``flow.h5`` that ``write_flow`` wrote into a folder.
+
+    Returns:
+        Pictures, walls, history and metrics; without timings and texts, which are not in the file.
+    """
     with h5py.File(folder / FLOW, "r") as file:
         pictures = [
             Picture(float(item.attrs["time"]), item["points"][()], item["velocity"][()], item["pressure"][()])

@@ -54,7 +54,10 @@ def touch(first: Body, second: Body) -> bool:
 
 
 def overlap(first: Body, second: Body) -> float:
-    """Return the largest depth of particles of the second body inside the first [m]; negative if all are outside."""
+    """Return the largest depth of particles of the second body below the surface of the first [m].
+
+    It is negative if all of them are outside.
+    """
     return float(measure_depths(second.points, *closed_surface(first)).max())
 
 
@@ -122,9 +125,9 @@ def _put_centre(body: Body, walls: Sequence[Plate], centre: Floats) -> None:
 
 
 def hand_over(old: Sequence[LiquidFlow], new: Sequence[LiquidFlow]) -> None:
-    """Transfer time and steps from old flows to those of remeshed bodies, the latest of each.
+    """Set time and number of steps of the flows of remeshed bodies to the largest of the old flows.
 
-    With the scheme ispg, motion, centre and energy budget are transferred, too.
+    With the scheme ispg, velocities, centre of mass and energy budget are transferred, too.
 
     Args:
         old: Flows of the bodies before remeshing; not changed.
@@ -215,7 +218,8 @@ def split_to_rest(flow: LiquidFlow, rule: StopRule, start: Callable[[Body], Liqu
 
     Args:
         flow: Flow of the body, with one contact line on each plate.
-        rule: Rule that ends the flow of a drop.
+        rule: Criteria by which the flow of a drop ends: tolerance and duration of rest, number of steps, end of the
+            process.
         start: Function of a body that returns the flow of a drop.
 
     Returns:

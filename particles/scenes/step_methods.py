@@ -40,7 +40,11 @@ class StepMethod:
 
 
 def has_motion(effects: Mapping[str, bool]) -> bool:
-    """Return whether inertia or viscosity acts, which have no effect at rest; name -> on or off."""
+    """Return whether inertia or viscosity acts, which have no effect at rest.
+
+    Args:
+        effects: Name of an effect -> on or off; missing effects are off.
+    """
     return any(effects.get(name, False) for name in AT_REST)
 
 
@@ -78,6 +82,9 @@ def start_solver(solder: Solder, effects: Mapping[str, bool], physics: Physics) 
         solder: Fluid and numerics, with the selected scheme.
         effects: Name of an effect, such as "inertia" -> on or off; missing effects are off.
         physics: Physics of the active effects; not changed.
+
+    Returns:
+        Step solver before its first step, and the physics with the added events.
     """
     method = step_method(solder, effects)
     solver = method.build(solder)

@@ -130,7 +130,10 @@ class Section(Body):
 
 
 def as_section(body: Body) -> Section:
-    """Return the body as a section.
+    """Return a body unchanged, typed as a two-dimensional body in section.
+
+    Args:
+        body: Liquid body, which must be a ``Section``: a drop whose free surface is a polyline in the plane y = 0.
 
     Raises:
         TypeError: The body is not a section.
@@ -174,7 +177,7 @@ def translate_copies(depth: float) -> Placements:
 
 
 def fill_block(polyline: Polyline, width: float, height: float, count: int) -> Cloud:
-    """Return a rectangular lattice of particles on the wall z = 0.
+    """Return the cloud of a rectangle: a lattice of particles in the plane y = 0 on the wall z = 0.
 
     The first particles below the surface are half a spacing off the axis: each has a pressure that keeps its volume,
     and on the axis only one velocity component, so that a column of them would lock.
@@ -205,7 +208,7 @@ def fill_block(polyline: Polyline, width: float, height: float, count: int) -> C
 
 
 def fill_disc(polyline: Polyline, radius: float, rings: int) -> Cloud:
-    """Return concentric circles of particles without a wall; half circles without particles on the axis for a meridian.
+    """Return the cloud of a free disc: concentric circles of particles, half circles off the axis for a meridian.
 
     Args:
         polyline: Meridian, or closed section of a plane drop.

@@ -106,5 +106,10 @@ class Heat:
 
 
 def enthalpy_at(freezing: Freezing, temperature: float) -> float:
-    """Return the specific enthalpy [J/kg] at a temperature [K]; at the melting point, of the liquid."""
+    """Return the specific enthalpy of an ink at a temperature, 0 for the solid at the melting point [J/kg].
+
+    Args:
+        freezing: Melting point, latent heat and heat capacity of the ink.
+        temperature: Temperature [K]; the melting point counts as liquid.
+    """
     return float(enthalpy.enthalpy(temperature, freezing.melting_point, freezing.heat_capacity, freezing.latent_heat))

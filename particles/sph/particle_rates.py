@@ -25,14 +25,14 @@ summed = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", 
 
 @compiled
 def periods_of(law):
-    """Return three pairs (period [m], 1 / period [1/m]) of a ``Law``, for x, y and z; (0, 0) if not periodic."""
+    """Return the pairs (period [m], 1 / period [1/m]) for x, y, z of a flow's ``Law``; (0, 0) if not periodic."""
     x, y, z = law.period_x, law.period_y, law.period_z
     return (x, 1.0 / x if x > 0.0 else 0.0), (y, 1.0 / y if y > 0.0 else 0.0), (z, 1.0 / z if z > 0.0 else 0.0)
 
 
 @compiled
 def constants_of(law):
-    """Return five constants of all pairs from a ``Law``, a tuple.
+    """Return five constants of all pairs of particles as a tuple, from the ``Law`` (parameters of the interaction).
 
     These are: whether the flow has one dimension, 1 / h [1/m], the factor sigma / h^2 of the kernel gradient, the
     softening 0.01 h^2 of viscosity [m^2], and sigma over W at one spacing.
@@ -107,7 +107,7 @@ def closing_in(k, velocity, d, fields):
 
 @compiled
 def pulls_not(law):
-    """Return whether walls exert no tension on liquid, as a boolean: if the ``Law`` has an untracked free surface."""
+    """Return whether walls cannot pull at liquid, a boolean: if the ``Law`` has a free surface that is not tracked."""
     return law.has_surface and not law.tracked
 
 

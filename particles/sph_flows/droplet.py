@@ -66,6 +66,9 @@ def follow(
         progress: Function called with the completed fraction, 0 to 1.
         checkpoint: Checkpoint to continue from, if its file exists, and to write.
 
+    Returns:
+        Pictures, history and metrics, and for impacts texts on their outcome.
+
     Raises:
         FloatingPointError: A position is not finite.
         SurfaceLost: The liquid has left its surface, or the surface has vanished.
@@ -86,6 +89,9 @@ def follow(
 def droplet(scene: Droplet) -> Simulation:
     """Set up the particles of a droplet and their surface, whose tension balances the pressure of a sphere.
 
+    Args:
+        scene: Parameters of the droplet: liquid, size, wall, speed, effects and numerics.
+
     Returns:
         Simulation at time 0, with the impact speed if there is one.
     """
@@ -101,7 +107,7 @@ def droplet(scene: Droplet) -> Simulation:
 
 
 def liquid_of(scene: Droplet, spacing: float) -> tuple[Law, float]:
-    """Return the law of a droplet in space and its surface tension.
+    """Return the parameters of the pair interactions of a droplet's liquid, and its surface tension.
 
     Args:
         scene: Parameters of the droplet: liquid, size, wall, speed, effects and numerics.

@@ -55,6 +55,9 @@ def solve_poiseuille(
 def channel(scene: Poiseuille) -> Simulation:
     """Set up liquid at rest between two plates, periodic along x and driven by a constant force.
 
+    Args:
+        scene: Parameters of the channel flow: width, speed, duration, liquid and numerics.
+
     Returns:
         Simulation at time 0, to be advanced by ``run_flow``.
     """
@@ -101,6 +104,9 @@ def solve_taylor_green(
 
 def vortices(scene: TaylorGreen) -> Simulation:
     """Set up the vortices of a scene in a periodic box without walls.
+
+    Args:
+        scene: Parameters of the vortices: side of the box, speed, duration, liquid and numerics.
 
     Returns:
         Simulation at time 0, with the exact initial velocities and pressures.

@@ -37,7 +37,7 @@ def capillary_limit(density: float, spacing: float, surface_tension: float) -> f
 
 
 def swing_period(solder: Solder, angle: float | None = None) -> float:
-    """Return the period of the slowest mode of a drop of all the solder [s].
+    """Return the period of the slowest oscillation of a drop that contains all the solder [s].
 
     Args:
         solder: Solder of the case: volume, fluid, contact angles and numerics.

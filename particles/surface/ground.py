@@ -16,7 +16,7 @@ def settle_on_ground(ground: LevelSet, points: Floats, outward: Floats, near: fl
     Args:
         ground: Level set of the solid ground: distances at the nodes of a grid [m], negative inside it.
         points: Vertices of the surface, shape (m, 3) [m]; changed in place.
-        outward: Outward normals of the vertices, shape (m, 3).
+        outward: Outward unit normals of the vertices, shape (m, 3); a vertex faces the ground if they point into it.
         near: Distance below which a vertex that faces the ground lies on it [m]; between it and twice it partly so.
 
     Returns:

@@ -118,7 +118,7 @@ def smooth_union(parts: Sequence[LevelSet], reach: float) -> LevelSet:
     It is the polynomial smooth minimum min(a, b) - max(reach - |a - b|, 0)^2 / (4 reach).
 
     Args:
-        parts: Level sets on the same grid.
+        parts: Level sets on the same grid, negative in the liquid; not changed.
         reach: Twice the width of the widest gap that is bridged [m].
     """
     values = parts[0].values
@@ -170,7 +170,15 @@ def smooth_on_level_set(
 
 
 def project_onto_level_set(level: LevelSet, points: Floats) -> Floats:
-    """Move points near the zero level onto it by one Newton step along the gradient; return them, shape (n, 3) [m]."""
+    """Move points near the zero level onto it by one Newton step along the gradient.
+
+    Args:
+        level: Values at the nodes of a grid [m].
+        points: Points, shape (n, 3) [m]; not changed.
+
+    Returns:
+        Moved points, shape (n, 3) [m].
+    """
     gradient = level.gradient(points)
     return points - (level.at(points) / (gradient**2).sum(axis=1))[:, None] * gradient
 
