@@ -20,7 +20,8 @@ from numba import prange
 from benchmarks.tension.lists import Untracked, looped
 from reflowshock.arrays import Floats
 from reflowshock.particles.sph.fluid_state import Fields
-from reflowshock.particles.sph.particle_rates import compiled, solved
+from reflowshock.particles.sph.particle_pairs import compiled
+from reflowshock.particles.sph.particle_rates import solved
 from reflowshock.particles.sph.smoothing import SUPPORT, shape, slope
 
 # Threshold of the colour gradient over 1 / h; smaller gradients have no reliable direction (Morris 2000).

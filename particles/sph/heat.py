@@ -18,7 +18,7 @@ from reflowshock.particles.flows.freezing import Freezing
 from reflowshock.particles.flows.sph_numerics import DIFFUSIVE
 from reflowshock.particles.sph import pair_terms
 from reflowshock.particles.sph.fluid_state import Fields, Law
-from reflowshock.particles.sph.particle_rates import apart, constants_of, periods_of, summed
+from reflowshock.particles.sph.particle_pairs import apart, constants_of, periods_of, summed
 from reflowshock.particles.sph.smoothing import slope
 from reflowshock.particles.sph.threads import Rows
 

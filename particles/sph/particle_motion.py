@@ -4,7 +4,7 @@ The array ``middle``, shape (7, n), has the velocity u + a dt / 2 and the densit
 step; its last three rows are the velocities that XSPH adds when it moves particles [m/s].
 """
 
-from reflowshock.particles.sph.particle_rates import compiled
+from reflowshock.particles.sph.particle_pairs import compiled
 
 
 @compiled

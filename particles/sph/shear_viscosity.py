@@ -7,14 +7,8 @@ from math import sqrt
 
 from numba import uint32
 
-from reflowshock.particles.sph.particle_rates import (
-    apart,
-    compiled,
-    liquid_among,
-    periods_of,
-    solved,
-    summed,
-)
+from reflowshock.particles.sph.particle_pairs import apart, compiled, liquid_among, periods_of, summed
+from reflowshock.particles.sph.particle_rates import solved
 from reflowshock.particles.sph.smoothing import slope
 
 NEWTON, POWER_LAW, CARREAU = 0, 1, 2
