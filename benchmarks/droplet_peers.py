@@ -228,11 +228,7 @@ def measure_reach(alpha: np.ndarray, wedge: Wedge) -> float:
 
 
 def run_widths() -> dict:
-    """Compute the maximum widths of the fastest impacts, and draw them over the contact angle.
-
-    Returns:
-        Name of the impact -> result of ``compare_widths``.
-    """
+    """Compute and draw the maximum widths of the fastest impacts; return name -> result of ``compare_widths``."""
     largest_widths = {name: compare_widths(IMPACTS[name]) for name in FAST}
     draw_widths(largest_widths)
     return largest_widths

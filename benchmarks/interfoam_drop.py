@@ -52,7 +52,7 @@ class Sample:
 
 
 def case_parameters(solder: Solder) -> dict[str, float | str]:
-    """Return the parameters that the OpenFOAM case includes."""
+    """Return the parameters of OpenFOAM's case, name -> word or number in SI units (contact angle in degrees)."""
     return {
         "contactAngle": ANGLE,
         "onWall": "slip",
