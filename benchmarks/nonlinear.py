@@ -349,7 +349,7 @@ def measure_growth(every: int = 1, formulation: str = "one_point") -> tuple[Bars
 
 
 def measure_window_growth(pair: Pair, fraction: float, formulation: str) -> dict[str, float]:
-    """Return the growth of a window by each scheme, and the number of step levels of the first scheme."""
+    """Return scheme -> spectral radius minus 1 of a window, and ``levels``, the step levels of the first scheme."""
     growth_rates: dict[str, float] = {}
     for name in ALONG_PATHS:
         coupled = flowing_pair(pair, SCHEMES[name], fraction, formulation)

@@ -20,7 +20,7 @@ FINE = 1.0 / 3.0
 
 
 def ray_directions(half: bool) -> Floats:
-    """Return directions, shape (400, 3), uniform over the sphere or its upper half, the first straight up."""
+    """Return unit vectors, shape (400, 3), uniform over the sphere or its upper half (``half``), the first upwards."""
     height = 1.0 - (np.arange(RAYS) / RAYS if half else 2.0 * np.arange(RAYS) / (RAYS - 1.0))
     turn, across = pi * (1.0 + sqrt(5.0)) * np.arange(RAYS), np.sqrt(np.maximum(1.0 - height**2, 0.0))
     return np.stack((across * np.cos(turn), across * np.sin(turn), height), axis=1)
