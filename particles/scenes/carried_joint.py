@@ -21,8 +21,8 @@ from reflowshock.particles.parameters.effects import acting_weight, decide_effec
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.forces import Wetting
 from reflowshock.particles.physics.physics import plate_wrench
-from reflowshock.particles.scenes.metrics import reference_meridian
 from reflowshock.particles.scenes.moving_joint import travel
+from reflowshock.particles.scenes.reference_shapes import reference_meridian
 from reflowshock.particles.scenes.reflow import LiquidJoint, solve_joint
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import RECORDS, NotAtRest, Run, run_to_rest

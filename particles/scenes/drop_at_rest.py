@@ -16,7 +16,8 @@ from reflowshock.particles.parameters.scenes import Drop
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.reference.young_laplace import Meridian, sessile_meridian, sessile_section, sphere_meridian
 from reflowshock.particles.scenes.flow_setup import contact_line, start_flow, stop_rule
-from reflowshock.particles.scenes.metrics import Metrics, body_metrics, reference_drop, with_shape_error
+from reflowshock.particles.scenes.metrics import Metrics, body_metrics, with_shape_error
+from reflowshock.particles.scenes.reference_shapes import reference_drop
 from reflowshock.particles.scenes.reflow import collect_shape
 from reflowshock.particles.scenes.section_drop import start_section
 from reflowshock.particles.section.section import Section

@@ -13,8 +13,9 @@ from reflowshock.particles.parameters.scenes import FloatingPackage, Joint
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.plate_motion import LIFT, SHIFT, TURN, Floating
 from reflowshock.particles.reference.young_laplace import Meridian
-from reflowshock.particles.scenes.metrics import Metrics, reference_meridian, with_shape_error
+from reflowshock.particles.scenes.metrics import Metrics, with_shape_error
 from reflowshock.particles.scenes.moving_joint import follow_path, settle_joint
+from reflowshock.particles.scenes.reference_shapes import reference_meridian
 from reflowshock.particles.scenes.reflow import solve_joint
 from reflowshock.particles.steps.shape import JointShape
 

@@ -5,7 +5,7 @@ import pytest
 
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
-from reflowshock.particles.scenes.metrics import reference_drop
+from reflowshock.particles.scenes.reference_shapes import reference_drop
 from reflowshock.particles.scenes.reflow import LiquidJoint, solve_joint
 from reflowshock.particles.steps.rest import run_to_rest
 from tests.support.drops import solve_drop

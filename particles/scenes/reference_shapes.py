@@ -1,0 +1,49 @@
+"""Young-Laplace references of joints and drops, as far as they exist."""
+
+from reflowshock.particles.core.geometry import JointGeometry
+from reflowshock.particles.parameters.solder import Solder
+from reflowshock.particles.reference.young_laplace import Meridian, NoMeridian, joint_meridian, pad_meridian
+
+
+def reference_meridian(geometry: JointGeometry, solder: Solder, weight: float | None) -> Meridian | None:
+    """Return the Young-Laplace meridian of a coaxial joint with Gibbs' condition at the pad edges.
+
+    Args:
+        geometry: Gap and pad radii.
+        solder: Volume, surface tension and contact angles.
+        weight: Specific weight [N/m^3]; None if the shape is not axisymmetric.
+
+    Returns:
+        Meridian; None without a weight, if the joint is not coaxial, or if it has no equilibrium.
+    """
+    if weight is None or not geometry.is_coaxial:
+        return None
+    try:
+        return joint_meridian(
+            solder.volume,
+            geometry.radius_board,
+            geometry.radius_package,
+            geometry.gap,
+            solder.surface_tension,
+            weight,
+            angle_limits=(solder.pad_contact_angle, solder.mask_contact_angle),
+        )
+    except NoMeridian:
+        return None
+
+
+def reference_drop(solder: Solder, pad_radius: float, weight: float | None) -> Meridian | None:
+    """Return the Young-Laplace meridian of a drop on a pad in the mask, with Gibbs' condition at the pad's edge.
+
+    Args:
+        solder: Volume, surface tension and contact angles.
+        pad_radius: Radius of the pad [m], infinite for a uniform wall.
+        weight: Specific weight [N/m^3]; None if the shape is not axisymmetric.
+
+    Returns:
+        Meridian; None without a weight.
+    """
+    if weight is None:
+        return None
+    limits = (solder.pad_contact_angle, solder.mask_contact_angle)
+    return pad_meridian(solder.volume, pad_radius, solder.surface_tension, weight, angle_limits=limits)
