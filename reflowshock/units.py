@@ -98,7 +98,12 @@ def from_si(value: float, unit: str, digits: int = 10) -> str:
 
 
 def in_unit(value: float, unit: str) -> float:
-    """Return the number of units of an SI value, e.g. 0.48 for 4.8e-4 in "mm"; inf and nan do not change."""
+    """Return an SI value as a number in another unit, e.g. 0.48 for 4.8e-4 and "mm"; inf and nan do not change.
+
+    Args:
+        value: Value in SI base units.
+        unit: Unit of the result.
+    """
     if not math.isfinite(value):
         return value
     parsed, base = _with_its_base(unit)

@@ -162,7 +162,7 @@ def square_around(diameter: float, inset: float) -> float:
 
 
 def uniform(start: float, end: float, size: float) -> Interval:
-    """Return an interval of an axis with equal cells.
+    """Return an interval of an axis that is divided into equal cells, for a plan of blocks.
 
     Args:
         start: Start of the interval [m].

@@ -218,6 +218,9 @@ def check_errors(mesh: JointMesh, errors: dict[str, float], largest_deviation: f
 def joint_quality(mesh: JointMesh) -> dict:
     """Return measures of the quality of a joint mesh, for the summary of a run.
 
+    Args:
+        mesh: Mesh of a joint, with the record of its meshing.
+
     Returns:
         ``volume_error``, ``section_scale`` and ``head_mismatch`` [m] (see ``JointMesh``); ``minimum_scaled_jacobian``;
         ``smallest_length``, material role -> smallest ratio of volume and largest face of an element [m]; and all

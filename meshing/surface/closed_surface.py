@@ -235,5 +235,10 @@ def area_vectors(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def pad_area(surface: ClosedSurface, pad: int) -> float:
-    """Return the wetted area [m^2] of all pads of one side; ``pad`` is its label, BOARD_PAD or PACKAGE_PAD."""
+    """Return the wetted area of all pads of one side [m^2].
+
+    Args:
+        surface: Closed surface of a joint, with labels of its triangles.
+        pad: Label of the side, BOARD_PAD or PACKAGE_PAD.
+    """
     return float(np.linalg.norm(area_vectors(surface.points, surface.triangles[surface.boundary == pad]), axis=1).sum())

@@ -128,6 +128,9 @@ def artificial_viscosity(scene: FlowScene) -> float:
 def decide_flow(scene: FlowScene) -> dict[str, Decision]:
     """Decide on all effects of a flow, the common and the specific ones of its scene.
 
+    Args:
+        scene: Parameters of the flow: liquid, sizes, switches of effects and numerics.
+
     Returns:
         Effect name -> state ``on``, reason ``why`` and, if predicted, ``influence``; only effects of the scene's
         method.

@@ -155,6 +155,9 @@ def smooth_velocities(last: Velocities, coefficients: Floats, smoothing: sparse.
         last: Coefficients V and unsmoothed velocities u of the particles before the step, shape (3 n,) each [m/s].
         coefficients: New coefficients V_new, shape (3 n,) [m/s].
         smoothing: Smoothing operator S, shape (3 n, 3 n).
+
+    Returns:
+        Coefficients and unsmoothed velocities for the next step, shape (3 n,) each [m/s].
     """
     carried = last.unsmoothed + smoothing @ (coefficients - last.coefficients)
     return Velocities(coefficients, (1.0 - RELAXATION) * carried + RELAXATION * (smoothing @ coefficients))

@@ -81,7 +81,11 @@ def _add_moments(points, triangles, result):
 
 
 def cell_share(body: Body) -> Floats:
-    """Return the share of a full cell of each particle, shape (n,): 1/2 on the free surface, 1 inside and on walls."""
+    """Return the share of a full cell of each particle, shape (n,): 1/2 on the free surface, 1 inside and on walls.
+
+    Args:
+        body: Liquid body, of which the numbers of particles and of surface particles are used.
+    """
     on_surface = np.arange(len(body.points)) < body.cloud.surface_count
     return np.where(on_surface, 0.5, 1.0)
 

@@ -25,7 +25,11 @@ FAST = 0.1
 
 
 def has_friction(physics: Physics) -> bool:
-    """Return whether walls resist liquid that slides on them (Navier slip or no slip)."""
+    """Return whether walls resist liquid that slides on them (Navier slip or no slip).
+
+    Args:
+        physics: Effects that act on a body, of which the frictions and constraints at plates are examined.
+    """
     return bool(physics.frictions or physics.holds)
 
 

@@ -208,7 +208,7 @@ class Prediction:
 
 
 def find_centre(body: Body) -> Floats:
-    """Return the centre of volume of the liquid, shape (3,) [m]."""
+    """Return the centre of the volume of a liquid body, shape (3,) [m]."""
     volume, first, _ = body_moments(body)
     return first / volume
 

@@ -77,6 +77,9 @@ def decide_oscillation(solder: Solder) -> dict[str, Decision]:
     """Decide on each effect of a free oscillating drop: name -> decision.
 
     A decision has the state ``on``, the reason ``why`` and, if predicted, the relative ``influence`` on the result.
+
+    Args:
+        solder: Volume, fluid and the switches of the effects.
     """
     return decide_all(LIQUID_EFFECTS, LiquidScene(drop_numbers(solder), solder, has_wall=False, swings=True))
 
@@ -91,7 +94,7 @@ def switched(effects: Mapping[str, Decision]) -> dict[str, bool]:
 
 
 def acting(effects: Mapping[str, bool]) -> Iterator[LiquidEffect]:
-    """Yield the effects that are on (their descriptions), in the order in which they are added to the physics.
+    """Yield the records of the effects that are on, in the order in which they are added to the physics.
 
     Args:
         effects: Name of an effect, such as "inertia" -> on or off; missing effects are off.
@@ -115,7 +118,7 @@ def acting_weight(solder: Solder, effects: Mapping[str, Decision]) -> float:
 
 
 def asymmetric_effect(effects: Mapping[str, Decision]) -> LiquidEffect | None:
-    """Return the first effect that is on and breaks the axis and the planes of symmetry of a drop; None without one.
+    """Return the record of the first effect that is on and breaks a drop's axis and planes of symmetry; None without.
 
     Args:
         effects: Name -> decision, of which ``on`` is read.

@@ -36,6 +36,10 @@ def dimensionless_numbers(geometry: JointGeometry, solder: Solder) -> Numbers:
 
     The height H is the gap, the length L the radius of a cylinder of equal volume and height H.
 
+    Args:
+        geometry: Gap between the pads.
+        solder: Volume, density, viscosity, surface tension and gravity.
+
     Returns:
         Bond and Ohnesorge number, capillary and viscous time [s].
     """

@@ -274,6 +274,10 @@ def oscillation_problems(scene: Oscillation, solder: Solder) -> list[Problem]:
 def free_problems(scene: HasWall, solder: Solder) -> list[Problem]:
     """Find effects that are switched on but need a wall, in a scene without one.
 
+    Args:
+        scene: Scene that may have a wall.
+        solder: Solder, whose switches of effects are examined.
+
     Returns:
         One ``Problem`` (key, message, value, allowed values) for each; empty for a scene with a wall.
     """

@@ -251,7 +251,15 @@ def _sessile(length: float, weightless: float, contact_angle: float, fluid: _Flu
 
 
 def sphere_meridian(volume: float, surface_tension: float) -> Meridian:
-    """Return the meridian of a free drop centred at the origin, from volume [m^3] and surface tension [N/m]."""
+    """Return the meridian of a free drop centred at the origin, a half circle.
+
+    Args:
+        volume: Volume [m^3].
+        surface_tension: Surface tension gamma [N/m].
+
+    Returns:
+        Radii and heights of the meridian [m], and the pressure in the drop [Pa].
+    """
     radius, psi = float(np.cbrt(3.0 * volume / (4.0 * np.pi))), np.linspace(0.0, np.pi, SAMPLES)
     pressure = 2.0 * surface_tension / radius
     return Meridian(radius * np.sin(psi), -radius * np.cos(psi), pressure, 0.0, float("nan"), float("nan"))

@@ -125,6 +125,9 @@ def carried_shape(place: JointGeometry, solder: Solder, first: Checkpoint, last:
         first: Checkpoint of the first reflow; may equal ``last``.
         last: Checkpoint of the last exchange; empty if the joint was open from the start.
 
+    Returns:
+        Particles, surface, history and metrics at rest.
+
     Raises:
         TooLittleSolder: No cone of the volume spans the gap, although a drop would reach the other pad.
         NotAtRest: The solder is not at rest after ``solder.numerics.max_steps``.

@@ -135,6 +135,9 @@ def travel(target: JointGeometry, flow: LiquidFlow, speed: float | None = None) 
         target: Geometry of the joint at the target.
         flow: Flow of the joint.
         speed: Speed of the package [m/s]; None for a fifth of a spacing in the longest time step.
+
+    Returns:
+        Motion of the plate: target position, speed [m/s] and lever of rotations [m].
     """
     if speed is None:
         speed = SPACINGS_PER_STEP * flow.body.cloud.spacing / flow.time_step.largest

@@ -85,6 +85,9 @@ def sizes(geometry: JointGeometry) -> Floats:
 
     They are the gap, the radii on board and package, the offset along x and y, and the rise of the pad's edge by the
     tilt.
+
+    Args:
+        geometry: Gap, radii, offset and tilt of a joint in canonical orientation.
     """
     discs = (geometry.gap, geometry.radius_board, geometry.radius_package)
     return np.array([*discs, *geometry.offset, geometry.tilt[1] * geometry.radius_package])

@@ -75,6 +75,9 @@ def write_body(folder: Path, shape: JointShape, reference: Meridian | None) -> N
 def read_body(folder: Path) -> tuple[JointShape, np.ndarray | None]:
     """Read the file ``shape.h5`` of ``write_body``.
 
+    Args:
+        folder: Folder that ``write_body`` has written.
+
     Returns:
         Shape, and radii and heights of the exact meridian, shape (2, k) [m]; None if none was written.
     """

@@ -46,6 +46,10 @@ def touch(first: Body, second: Body) -> bool:
     """Return whether the free surfaces of two bodies (particles with a triangulated surface) touch.
 
     They do if two of their vertices are within about the smaller particle spacing of each other.
+
+    Args:
+        first: One body, not changed.
+        second: Another body, not changed.
     """
     reach = CONTACT_SPACINGS * min(first.cloud.spacing, second.cloud.spacing)
     surfaces = [body.points[: body.cloud.surface_count] for body in (first, second)]
@@ -57,6 +61,10 @@ def overlap(first: Body, second: Body) -> float:
     """Return the largest depth of particles of the second body below the surface of the first [m].
 
     It is negative if all of them are outside.
+
+    Args:
+        first: Body with a triangulated surface, not changed.
+        second: Body whose particles are tested, not changed.
     """
     return float(measure_depths(second.points, *closed_surface(first)).max())
 
@@ -65,6 +73,9 @@ def collapsing(body: Body) -> bool:
     """Return whether triangles of a body have collapsed to slivers, or its contact lines meet.
 
     Slivers have an edge that is short in relation to the particle spacing, or a poor ratio of area to edges.
+
+    Args:
+        body: Liquid body: particles, triangles of its free surface, and contact lines.
     """
     corner = body.points[body.triangles]
     square = ((corner - np.roll(corner, 1, axis=1)) ** 2).sum(axis=2)
@@ -159,6 +170,9 @@ def closed_surface(body: Body) -> tuple[Floats, Indices]:
     """Return the closed surface of a body and its mirror image behind each wall.
 
     The image closes a body on one wall; between two walls, lids far behind the walls close it.
+
+    Args:
+        body: Liquid body: particles, triangles of its free surface, and contact lines.
 
     Returns:
         Points, shape (n, 3) [m], and triangles, shape (t, 3).

@@ -171,7 +171,7 @@ def rotate_copies(angles: Floats) -> Placements:
 
 
 def translate_copies(depth: float) -> Placements:
-    """Return two copies a depth [m] apart along y, on either side of the section."""
+    """Return the placements of two copies of a plane section, half of ``depth`` [m] to either side of it along y."""
     shifts = depth * np.array([[0.0, -0.5, 0.0], [0.0, 0.5, 0.0]])
     return Placements(np.broadcast_to(np.eye(3), (2, 3, 3)), shifts)
 
@@ -187,6 +187,9 @@ def fill_block(polyline: Polyline, width: float, height: float, count: int) -> C
         width: Half width [m].
         height: Height [m].
         count: Number of particles along the height.
+
+    Returns:
+        Particles, with the vertices of the surface as polyline segments and the contact points on the wall.
     """
     last = count - 1
     across = max(3, round(width / height * last))
@@ -214,6 +217,9 @@ def fill_disc(polyline: Polyline, radius: float, rings: int) -> Cloud:
         polyline: Meridian, or closed section of a plane drop.
         radius: Radius of the outer circle [m].
         rings: Number of circles.
+
+    Returns:
+        Particles, with the vertices of the surface as polyline segments; without contact points.
     """
     shells = []
     for ring in range(rings, 0, -1):

@@ -138,6 +138,9 @@ def device_of(scene: FlowScene) -> Callable[[Fields, int, Law], Particles]:
     The class takes the initial ``Fields``, the number of liquid particles and the ``Law``; its objects move the
     particles in parallel on threads, or on a GPU if the numerical parameters of the scene name the device "cuda".
 
+    Args:
+        scene: Parameters of the flow, whose numerics name the device, "cpu" or "cuda".
+
     Raises:
         NoDeviceError: The machine has no CUDA device.
     """
@@ -156,6 +159,9 @@ def law_of(scene: FlowScene, periods: Vector, gravity: Vector, has_surface: bool
         periods: Periods along x, y and z [m]; 0 if not periodic.
         gravity: Gravity along x, y and z [m/s^2].
         has_surface: Whether the liquid has a free surface, near which particles cannot be shifted.
+
+    Returns:
+        Kernel, smoothing length, density, speed of sound, viscosity and the other constants of the pairs.
     """
     numerics, spacing, sound = sph_numerics(scene), scene.spacing, sph_sound(scene)
     length, kernel = numerics.smoothing_length * spacing, KERNELS[numerics.kernel]
@@ -189,6 +195,9 @@ def law_of(scene: FlowScene, periods: Vector, gravity: Vector, has_surface: bool
 
 def shear_law(scene: FlowScene) -> dict[str, Any]:
     """Return the parameters of a shear-dependent viscosity, by their names in ``Law``; neutral ones without it.
+
+    Args:
+        scene: Parameters of the flow, with its rheology (None without shear dependence) and viscosity.
 
     Returns:
         Dict of ``rheology`` (number of the viscosity law), ``exponent``, ``shear_rate`` [1/s], ``least_viscosity`` and

@@ -60,7 +60,14 @@ class PinningState:
 
 
 def pinning_of(lines: Sequence[ContactLine]) -> list[PinningState]:
-    """Copy the current pinning of contact lines, for ``restore_pinning``; one copy for each line, in their order."""
+    """Copy the current pinning of contact lines, for ``restore_pinning``.
+
+    Args:
+        lines: Contact lines; not changed.
+
+    Returns:
+        State and pad of each vertex, whether it was stopped at an edge, and the energy constant, for each line.
+    """
     return [PinningState.of(line) for line in lines]
 
 

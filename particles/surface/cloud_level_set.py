@@ -47,6 +47,9 @@ def cloud_from_level_set(level: LevelSet, volume: float, walls: Sequence[Plate])
         volume: Volume of the liquid, kept exactly [m^3].
         walls: Horizontal plates that the liquid stands on or hangs from, the lower one first.
 
+    Returns:
+        Particles, with the triangles of the free surface, contact lines, and a plate for each line.
+
     Raises:
         CannotRebuild: Contact lines meet in a point.
     """

@@ -55,6 +55,9 @@ def signed_distance(points: Floats, triangles: Indices, grid: Grid) -> LevelSet:
         points: Vertices, shape (n, 3) [m].
         triangles: Outward oriented triangles, shape (t, 3), that share the vertices of their edges.
         grid: Regular grid of nodes: origin, spacing and numbers of nodes.
+
+    Returns:
+        Distances at the nodes of the grid, shape (i, j, k) [m].
     """
     import pyvista  # most reflows need no level set, and start without it
 
@@ -71,6 +74,9 @@ def signed_distance_in_band(points: Floats, triangles: Indices, grid: Grid, band
         triangles: Outward oriented triangles, shape (t, 3), that share the vertices of their edges.
         grid: Regular grid of nodes: origin, spacing and numbers of nodes.
         band: Largest magnitude [m]; nodes farther from the surface get it with the sign of their side.
+
+    Returns:
+        Distances at the nodes of the grid, shape (i, j, k) [m].
     """
     distance = np.full(grid.shape, band)
     near_distance.lower_to_distance(points, triangles, grid.origin, grid.spacing, distance)
