@@ -98,6 +98,9 @@ def time_on_threads(simulation: Simulation, threads: int) -> tuple[float, float]
 def measure(simulation: Simulation) -> dict[str, float]:
     """Measure the rate of one thread and the speed-up of two; each is the best of several turns.
 
+    Args:
+        simulation: Simulation, whose time advances in place.
+
     Returns:
         ``particles``, ``neighbours_listed``, ``particle_steps_per_second`` of one thread (processor time), and
         ``two_threads_over_one``, a ratio of wall times.

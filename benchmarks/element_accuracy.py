@@ -294,7 +294,7 @@ def format_cells(row: dict) -> list[str]:
 
 
 def format_seconds(value: float) -> str:
-    """Format seconds with two digits and without exponent."""
+    """Format a ``value`` in seconds with two digits, without exponent and with its unit."""
     return f"{value:.0f} s" if value >= 10 else f"{value:.2g} s"
 
 

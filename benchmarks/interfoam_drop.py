@@ -82,9 +82,12 @@ def measure_samples(states: Iterable[State], solder: Solder) -> list[Sample]:
 
 
 def measure_extent(alpha: np.ndarray) -> tuple[float, float, float]:
-    """Return height [m], width at the wall [m] and volume [m^3] from volume fractions, shape (rows, columns).
+    """Return height [m], width at the wall [m] and volume [m^3] of a drop in a wedge of cells.
 
     The width at the wall is extrapolated from the radii of the two lowest rows.
+
+    Args:
+        alpha: Volume fraction of the liquid in each cell, shape (rows, columns).
     """
     radius = WEDGE.radii(alpha)
     volume = np.pi * WEDGE.cell * float((radius**2).sum())
@@ -93,6 +96,9 @@ def measure_extent(alpha: np.ndarray) -> tuple[float, float, float]:
 
 def find_rest(drop_samples: list[Sample]) -> tuple[Sample | None, list[Sample]]:
     """Find the sample from which on height and width stay near their means over the last third of the samples.
+
+    Args:
+        drop_samples: Samples in order of time: height, width and others.
 
     Returns:
         That sample, None if the drop does not come to rest, and the last third of the samples.

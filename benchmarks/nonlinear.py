@@ -170,7 +170,7 @@ def compare_with_peers() -> tuple[Bars, dict]:
 
 
 def move_body(mesh: MeshData, material: Material, kind: str, displacement: np.ndarray) -> ExplicitMotion:
-    """Return a body in finite rotation at a displacement [m], shape (n, 3), with its force there."""
+    """Return the motion of a body in finite rotation at a displacement [m], shape (n, 3), with its force there."""
     step = 0.5 * nonlinear_body(mesh, material, ForceOptions("corotational"), kind)[1]
     motion = motion_of(nonlinear_body(mesh, material, ForceOptions("corotational", step), kind)[0], step)
     motion.displacement[:] = displacement[motion.body.local.nodes]

@@ -80,6 +80,9 @@ def warpage(points: np.ndarray, displacement: np.ndarray) -> float:
 def solve_by_program(mesh: MeshData) -> tuple[float, dict]:
     """Heat a package in the program's hexahedra, with a detached cell of board that the program requires.
 
+    Args:
+        mesh: Quarter of the package.
+
     Returns:
         Warpage [m], and the costs ``equations`` and ``factor_bytes``.
     """
@@ -94,6 +97,10 @@ def solve_by_program(mesh: MeshData) -> tuple[float, dict]:
 
 def solve_by_dolfinx(mesh: MeshData, degree: int) -> tuple[float, dict]:
     """Heat a package in Lagrange hexahedra of a polynomial degree that DOLFINx assembles.
+
+    Args:
+        mesh: Quarter of the package.
+        degree: Polynomial degree of the elements.
 
     Returns:
         Warpage [m], and the costs ``equations`` and ``factor_bytes``.
@@ -233,6 +240,9 @@ def pads_of(sites: list) -> Pads:
 
 def measure_board(assembly: Assembly) -> dict:
     """Assemble a heated package on its board and solve it with random wrenches on the pads.
+
+    Args:
+        assembly: Mesh file, pads, materials and heating.
 
     Returns:
         ``equations``, ``factor_mb``, ``factor_operations``, ``build_seconds``, ``solve_seconds``, and
