@@ -15,14 +15,17 @@ MM = 1e-3
 
 
 def cylinder(fill, gap, radius=RADIUS):
+    """Return the volume of a cylinder in a gap, times a factor ``fill`` [m^3]."""
     return fill * np.pi * radius**2 * gap
 
 
 def check_energy_falls(energy):
+    """Check that the energy of no step exceeds that before it, up to rounding."""
     assert np.diff(energy).max() < 1e-9 * abs(energy[0])
 
 
 def check(shape, verdict):
+    """Check verdict, volume, positions and width of a joint at rest."""
     assert shape.verdict == verdict
     assert abs(shape.metrics["volume_drift"][0]) < 1e-6
     assert np.isfinite(shape.points).all()
