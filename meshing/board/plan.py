@@ -183,11 +183,11 @@ def hole_rings(board: Board) -> int:
 
 
 def column_levels(thickness: float, boxes: int, imprint: Imprint) -> np.ndarray:
-    """Return the depths of the layers of the column below or above an imprinted pad, from its face, (layers + 1,) [m].
+    """Return the depths of the layers of the column below or above an imprinted pad, shape (layers + 1,) [m].
 
-    The depths begin with 0 and end with the thickness; they include the planes between the boxes of the surrounding
-    mesh. A layer at depth z has the height h = first_layer + (growth - 1) z, reduced so that a whole number of layers
-    fits into each box.
+    The depths from the pad's face begin with 0 and end with the thickness; they include the planes between the boxes of
+    the surrounding mesh. A layer at depth z has the height h = first_layer + (growth - 1) z, reduced so that a whole
+    number of layers fits into each box.
 
     Args:
         thickness: Thickness of board or substrate [m].

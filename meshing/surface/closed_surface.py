@@ -62,7 +62,8 @@ def close_rings(points: np.ndarray, triangles: np.ndarray, rings: Sequence[np.nd
     Args:
         points: Vertices, shape (n, 3) [m]; vertices without a triangle are dropped.
         triangles: Triangles of the free surface, outward oriented, open along the rings, shape (t, 3).
-        rings: Vertices along each contact line, in order; contact lines in the lower half belong to the board.
+        rings: Vertices along each contact line, in order, shape (k,) each; contact lines in the lower half belong to
+            the board.
 
     Returns:
         Vertices, triangles, and a label of each triangle: FREE, BOARD_PAD or PACKAGE_PAD.

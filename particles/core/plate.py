@@ -116,7 +116,7 @@ def slide(plates: Sequence[Plate], wall: NDArray[np.int8], field: Floats) -> Flo
     Args:
         plates: Plates, e.g. of a body, numbered from 0.
         wall: Number of the plate of each vector, -1 for none, shape (k,).
-        field: Vectors, shape (k, 3); not changed.
+        field: Vectors of any unit, shape (k, 3); not changed.
 
     Returns:
         Tangential vectors, shape (k, 3); vectors without a plate as they are.

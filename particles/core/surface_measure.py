@@ -202,7 +202,7 @@ def volume_and_gradient(
     Args:
         points: Positions, shape (n, 3) [m].
         triangles: Outward triangles of the free surface, shape (t, 3).
-        rings: Vertices of each contact line.
+        rings: Vertices of each contact line in order, shape (k,) each; empty for a closed surface.
         plates: Wall of each contact line.
 
     Returns:

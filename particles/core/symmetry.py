@@ -93,7 +93,7 @@ def fold(cloud: Cloud, field: Floats, first: int = 0) -> Floats:
 
     Args:
         cloud: Particles of the computed part of a body, cut off at the planes of symmetry that it lists.
-        field: Vectors at consecutive particles, shape (k, 3); not changed.
+        field: Vectors of any unit at consecutive particles, shape (k, 3); not changed.
         first: Number of the particle of the first vector.
     """
     result = field.copy()

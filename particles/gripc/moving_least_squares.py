@@ -128,10 +128,10 @@ def shape_weights(rows, points, offsets, indices, support):
     """Return the linear MLS shape functions psi_J = w_J p_J . M^-1 (1, 0, 0, 0) at some particles.
 
     Args:
-        rows: Particles, shape (m,).
+        rows: Numbers of the particles at which the functions are fitted, integers, shape (m,).
         points: Positions, shape (n, 3) [m].
         offsets: Start of each particle's neighbours in ``indices``, shape (n + 1,).
-        indices: Neighbours, shape (k,).
+        indices: Numbers of the neighbours of all particles, integers.
         support: Support radius, scalar [m].
 
     Returns:
@@ -173,10 +173,10 @@ def linear_weights(rows, points, offsets, indices, support):
     (Belytschko et al. 1996). Distances are in units of the support radius.
 
     Args:
-        rows: Particles, shape (m,).
+        rows: Numbers of the particles at which the functions are fitted, integers, shape (m,).
         points: Positions, shape (n, 3) [m].
         offsets: Start of each particle's neighbours in ``indices``, shape (n + 1,).
-        indices: Neighbours, shape (k,).
+        indices: Numbers of the neighbours of all particles, integers.
         support: Support radius, scalar [m].
 
     Returns:
@@ -326,10 +326,10 @@ def quadratic_weights(rows, points, offsets, indices, support):
     A row whose neighbours do not determine the quadratic terms falls back to a linear fit.
 
     Args:
-        rows: Particles, shape (m,).
+        rows: Numbers of the particles at which the expansion is fitted, integers, shape (m,).
         points: Positions, shape (n, 3) [m].
         offsets: Start of each particle's neighbours in ``indices``, shape (n + 1,).
-        indices: Neighbours, shape (k,).
+        indices: Numbers of the neighbours of all particles, integers.
         support: Support radius, scalar [m].
 
     Returns:

@@ -292,7 +292,7 @@ def fit_oscillation(time: Floats, values: Floats, frequency: float) -> tuple[flo
 
     Args:
         time: Times, shape (k,) [s], over more than a period.
-        values: Values, shape (k,).
+        values: Values of the oscillation in any unit, shape (k,).
         frequency: Guess of the angular frequency within about 20 % [rad/s]; a guess of half the frequency is detected,
             since the harmonic is then larger.
     """

@@ -60,7 +60,7 @@ def apart(place, j, side, fields, periods):
     Args:
         place: Position (x, y, z) [m].
         j: Number of the particle, integer.
-        side: 1 for the particle, -1 for its image behind the plane z = 0.
+        side: Scalar, 1 for the particle, -1 for its image behind the plane z = 0.
         fields: ``Fields``: arrays of position, velocity, density, pressure and mass of all particles, liquid first.
         periods: Pairs (period [m], 1 / period [1/m]) for x, y and z, (0, 0) if not periodic.
     """

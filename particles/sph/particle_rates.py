@@ -227,7 +227,7 @@ def solved(moments, sums, dimension):
         moments: Entries xx, yy, zz, xy, yz and xz of a dimensionless symmetric matrix, about the identity inside the
             liquid; a tuple of six scalars.
         sums: Right-hand side (x, y, z), a tuple of three scalars in the unit of the gradient.
-        dimension: Dimension of the flow, 1 (along x), 2 (x and z) or 3.
+        dimension: Dimension of the flow, integer: 1 (along x), 2 (x and z) or 3.
     """
     xx, yy, zz, xy, yz, xz = moments
     bx, by, bz = sums
@@ -302,7 +302,7 @@ def condition_of(moments, dimension):
 
     Args:
         moments: Entries xx, yy, zz, xy, yz and xz of the matrix, a tuple of six scalars.
-        dimension: Dimension of the flow: 1 for xx only, 2 for x and z, 3 for the whole matrix.
+        dimension: Dimension of the flow, integer: 1 for xx only, 2 for x and z, 3 for the whole matrix.
     """
     xx, yy, zz, xy, yz, xz = moments
     if dimension == 1:

@@ -32,7 +32,13 @@ def settle_on_ground(ground: LevelSet, points: Floats, outward: Floats, near: fl
 
 
 def remove_normal_part(vectors: Floats, wetness: Floats, normals: Floats) -> Floats:
-    """Return vectors (m, 3) without their component along the ground's normals, in proportion to the wetness (m,)."""
+    """Return vectors without their component normal to the ground, in proportion to the wetness, shape (m, 3).
+
+    Args:
+        vectors: Vectors of any unit at the vertices of a surface, shape (m, 3); not changed.
+        wetness: Share of the component that is removed, 0 to 1, shape (m,).
+        normals: Unit normals of the ground, shape (m, 3).
+    """
     return vectors - (wetness * (vectors * normals).sum(axis=1))[:, None] * normals
 
 

@@ -161,7 +161,7 @@ def smooth_on_level_set(
         level: Level set that is zero on the surface, symmetric about the walls.
         points: Vertices, shape (n, 3) [m].
         triangles: Triangles, shape (t, 3).
-        rings: Contact lines, each in a horizontal wall, in which it stays.
+        rings: Contact lines as vertices in order, shape (k,) each; each stays in its horizontal wall.
 
     Returns:
         New vertices (n, 3) [m] and triangles (t, 3).

@@ -196,7 +196,7 @@ def cover_dry_spots(
     Args:
         points: Vertices, shape (m, 3) [m].
         triangles: Triangles, shape (t, 3).
-        rings: Contact lines, clockwise around dry spots.
+        rings: Contact lines as vertices in order, shape (k,) each, clockwise around dry spots.
         spacing: Particle spacing [m].
 
     Returns:
@@ -269,9 +269,9 @@ def smooth_surface(
     Args:
         points: Vertices, shape (m, 3) [m].
         triangles: Triangles, shape (t, 3).
-        rings: Contact lines on the wall z = 0, whose sharp bends are blunted.
-        lines: All lines along which the surface has a sharp edge, as vertices in order, the contact lines included;
-            their vertices move along them.
+        rings: Contact lines on the wall z = 0, whose sharp bends are blunted, as vertices in order, shape (k,) each.
+        lines: All lines along which the surface has a sharp edge, as vertices in order, shape (k,) each, the contact
+            lines included; their vertices move along them.
     """
     points = points + smoothing_offsets(points, triangles, len(points), lines)
     for ring in rings:
@@ -309,7 +309,7 @@ def is_worn(points: Floats, triangles: Indices, rings: Sequence[Indices], spacin
     Args:
         points: Vertices, shape (m, 3) [m].
         triangles: Outward oriented triangles, shape (t, 3).
-        rings: Contact lines; empty for a closed surface.
+        rings: Contact lines as vertices in order, shape (k,) each; empty for a closed surface.
         spacing: Particle spacing, to which the size of triangles is compared [m].
     """
     if not rings and is_folded(points, triangles, spacing):
