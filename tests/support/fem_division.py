@@ -21,7 +21,7 @@ def by_patch(whole: Whole, survey: Survey, rules: Rules) -> Division:
 
 
 def naive(whole: Whole, survey: Survey, rules: Rules) -> Division:
-    """Divide a mesh by its parts with a window that ignores the elements at the cut, which is unstable.
+    """Divide a mesh by its parts with a window that follows from the macro elements alone.
 
     Args:
         whole: Joined mesh of board, package and joints.
@@ -29,7 +29,7 @@ def naive(whole: Whole, survey: Survey, rules: Rules) -> Division:
         rules: Settings of the division.
 
     Returns:
-        Cells of both models and their time steps; the window follows from the macro elements alone.
+        Cells of both models and their time steps; the window ignores the elements at the cut.
     """
     macro = whole.mesh.in_parts("board".__eq__)
     return in_two_steps("held_velocity", macro, ~macro, plan_windows(rules, macro, survey.step))
