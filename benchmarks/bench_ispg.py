@@ -21,7 +21,12 @@ STEPS = 60
 
 
 def measure(count: int) -> dict[str, float]:
-    """Return the cost of a step of a cube with ``count`` particles per edge."""
+    """Measure the cost of a step of the scheme ispg for a cube with ``count`` particles per edge.
+
+    Returns:
+        ``particles`` (their number), ``seconds_a_step`` (processor time), ``particle_steps_per_second``, and
+        ``iterations`` of the pressure solve, the mean over the steps.
+    """
     numerics = SolderNumerics(scheme="ispg", time_step_limit=20)
     angle = float(np.radians(60))
     solder = Solder(volume=1e-9, pad_contact_angle=angle, surface_tension=4.985, viscosity=0.227, numerics=numerics)
@@ -41,6 +46,7 @@ def measure(count: int) -> dict[str, float]:
 
 
 def main() -> None:
+    """Measure cubes of several sizes, store the rows and print them."""
     measure(5)
     rows = [measure(count) for count in PER_EDGE]
     results.write_figures(NAME, rows)

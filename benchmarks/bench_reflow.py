@@ -34,7 +34,16 @@ COLUMNS = (
 
 
 def run_joint(gap: float, numerics: SolderNumerics) -> dict:
-    """Solve one joint and return its figures, or the failure if it does not come to rest."""
+    """Solve one joint to rest and return its figures.
+
+    Args:
+        gap: Gap between the pads [mm].
+        numerics: Particle spacing and limit of the time step.
+
+    Returns:
+        ``gap_mm``, ``spacing_mm``, ``time_step_limit``, ``verdict`` and the metrics in ``COLUMNS`` in SI units;
+        ``failure``, the message, instead of the last two if the joint does not come to rest.
+    """
     solder = Solder(volume=BALL, numerics=numerics)
     row = {"gap_mm": gap, "spacing_mm": numerics.spacing / MM, "time_step_limit": numerics.time_step_limit}
     try:
@@ -45,7 +54,16 @@ def run_joint(gap: float, numerics: SolderNumerics) -> dict:
 
 
 def measure_derivatives(basis: str, count: int) -> dict:
-    """Return relative errors of gradient and Laplacian of sin(2x) cos(y) exp(z) on a perturbed lattice, and cost."""
+    """Measure the error and the cost of fitted derivatives of sin(2x) cos(y) exp(z) on a perturbed lattice.
+
+    Args:
+        basis: Polynomial basis of the fit, "linear" or "quadratic".
+        count: Number of points along each edge of the unit cube.
+
+    Returns:
+        ``basis``, ``per_edge``, ``gradient_error`` and ``laplacian_error`` (relative, in the 2-norm), and
+        ``microseconds_a_particle``.
+    """
     axis, spacing = np.linspace(0.0, 1.0, count), 1.0 / (count - 1)
     points = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3)
     points += np.random.default_rng(13).uniform(-0.1, 0.1, points.shape) * spacing
@@ -68,7 +86,14 @@ def measure_derivatives(basis: str, count: int) -> dict:
 
 
 def fit_step_cost(rows: list[dict]) -> dict:
-    """Fit seconds per step = a + b n, the model of ``particles.parameters.estimate``."""
+    """Fit the cost of a step by a + b n with the number n of particles, the model of ``particles.parameters.estimate``.
+
+    Args:
+        rows: Figures of ``run_joint``; failed runs are ignored.
+
+    Returns:
+        ``seconds_per_step`` (a) and ``seconds_per_step_and_particle`` (b) [s].
+    """
     rows = [row for row in rows if "seconds" in row]
     slope, constant = np.polyfit([row["particles"] for row in rows], [row["seconds"] / row["steps"] for row in rows], 1)
     return {"seconds_per_step": float(constant), "seconds_per_step_and_particle": float(slope)}

@@ -26,7 +26,7 @@ STEPS = 8
 
 
 def make_cube(count: int) -> LiquidFlow:
-    """Return the flow of a cube of solder with ``count`` particles per edge that wets a wall."""
+    """Return a cube of solder with ``count`` particles per edge on a wall at 60 degrees, at time 0, ready for steps."""
     numerics = SolderNumerics(time_step_limit=100)
     solder = Solder(volume=1e-9, pad_contact_angle=np.radians(60), numerics=numerics)
     cloud = box_cloud(1e-3, count)
@@ -39,7 +39,12 @@ def peak_memory() -> float:
 
 
 def measure(count: int) -> dict:
-    """Return the cost and the memory of a step of a cube with ``count`` particles per edge."""
+    """Measure the cost and the memory of a reflow step of a cube with ``count`` particles per edge.
+
+    Returns:
+        ``particles``, ``threads``, ``seconds_a_step`` (wall time), ``particle_steps_per_second``, largest number of
+        ``iterations`` of the pressure solve, and ``bytes_a_particle``.
+    """
     make_cube(7).step()
     before, flow = peak_memory(), make_cube(count)
     records = [flow.step()]
@@ -58,6 +63,7 @@ def measure(count: int) -> dict:
 
 
 def main() -> None:
+    """Measure cubes of several sizes on one and two threads, each in a process of its own; store and print the rows."""
     rows = []
     for count in PER_EDGE:
         for threads in (1, 2):

@@ -33,13 +33,19 @@ SIZES, SHARED = {ACROSS: 200, 60: 200, 124: 100, 197: 50}, 60
 
 
 def make_dam_break() -> Simulation:
-    """Return a plane dam break of 20 000 particles of water."""
+    """Return a plane dam break of 20 000 particles of water at its start."""
     numerics = SphNumerics(particles_across=100)
     return dam(DamBreak(height=0.6, width=1.2, tank_length=3.22, sensor_height=0.12, duration=1.0, numerics=numerics))
 
 
 def make_ink_scene(tension: str, across: int, device: str = "cpu") -> Droplet:
-    """Return a drop of ink that strikes a wall, with or without surface tension."""
+    """Return the parameters of a drop of ink that strikes a wall at 5 m/s.
+
+    Args:
+        tension: Surface tension, "on" or "off".
+        across: Number of particles across the diameter.
+        device: Device that computes the drop, "cpu" or "cuda".
+    """
     effects = DropletEffects(surface_tension=tension, viscosity="on")
     liquid = {"density": 1000.0, "surface_tension": 0.072, "viscosity": 0.0149, "contact_angle": 1.57, "speed": 5.0}
     numerics = DropletNumerics(particles_per_diameter=across, device=device)
@@ -47,14 +53,18 @@ def make_ink_scene(tension: str, across: int, device: str = "cpu") -> Droplet:
 
 
 def make_drop() -> Simulation:
-    """Return a drop of 28 000 particles with a tracked surface."""
+    """Return a drop of 28 000 particles with a tracked surface, before it strikes a wall."""
     return droplet(make_ink_scene("on", ACROSS))
 
 
 def make_stretched_drop(across: int, device: Callable[..., Any]) -> Simulation:
-    """Return a free drop without a tracked surface or particle shifting, stretched along z.
+    """Return a free drop without a tracked surface or particle shifting, whose velocities stretch it along z.
 
     Its viscosity is a tenth of that of ink, so that the speed of sound limits the time step of all sizes.
+
+    Args:
+        across: Number of particles across the diameter.
+        device: Class of the particles: ``ThreadParticles`` or ``CudaParticles``.
     """
     scene = make_ink_scene("off", across)
     coordinates = (np.arange(-(across // 2) - 1, across // 2 + 1) + 0.5) * scene.spacing
@@ -70,7 +80,7 @@ def make_stretched_drop(across: int, device: Callable[..., Any]) -> Simulation:
 
 
 def time_steps(simulation: Simulation, steps: int) -> float:
-    """Take steps and return their wall time [s], GPU work included."""
+    """Take ``steps`` steps of a simulation, in place, and return their wall time [s], GPU work included."""
     start = perf_counter()
     for _ in range(steps):
         simulation.step(simulation.time_step())
@@ -79,14 +89,22 @@ def time_steps(simulation: Simulation, steps: int) -> float:
 
 
 def time_on_threads(simulation: Simulation, threads: int) -> tuple[float, float]:
-    """Return wall and processor time [s] of ``STEPS`` steps on a number of threads."""
+    """Take ``STEPS`` steps of a simulation on ``threads`` threads; return their wall and processor time [s]."""
     set_num_threads(threads)
     processor = process_time()
     return time_steps(simulation, STEPS), process_time() - processor
 
 
 def measure(simulation: Simulation) -> dict[str, float]:
-    """Return the rate of one thread (processor time) and the speed-up of two (wall time), each from the best turn."""
+    """Measure the rate of one thread and the speed-up of two; each is the best of several turns.
+
+    Args:
+        simulation: Simulation, whose time advances in place.
+
+    Returns:
+        ``particles``, ``neighbours_listed``, ``particle_steps_per_second`` of one thread (processor time), and
+        ``two_threads_over_one``, a ratio of wall times.
+    """
     most = get_num_threads()
     time_on_threads(simulation, most)
     turns = [(time_on_threads(simulation, 1), time_on_threads(simulation, min(2, most))) for _ in range(TURNS)]
@@ -100,7 +118,13 @@ def measure(simulation: Simulation) -> dict[str, float]:
 
 
 def measure_gpu() -> dict[str, Any] | None:
-    """Return particle-steps per second of a GPU and of the threads of the same machine; None without a GPU."""
+    """Measure a GPU and the threads of the same machine by a free drop; return None without a GPU.
+
+    Returns:
+        ``card`` (its name); ``sizes``, number of particles -> ``particle_steps_per_second``, ``steps_of_a_list`` and
+        ``bytes_of_particle``; ``gpu`` and ``threads_N``, particle-steps per second of one size on the GPU and on N
+        threads.
+    """
     from numba import cuda
 
     from reflowshock.particles.sph.cuda_particles import CudaParticles
@@ -132,6 +156,7 @@ def measure_gpu() -> dict[str, Any] | None:
 
 
 def main() -> None:
+    """Measure all scenes on threads and, if there is one, on a GPU; store and print figures and limits."""
     scenes = {
         "dam_break": make_dam_break(),
         "free_drop": make_stretched_drop(ACROSS, ThreadParticles),

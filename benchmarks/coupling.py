@@ -37,7 +37,16 @@ SOURCES = ("coupling_stability", "two_scale", "two_scale_peers")
 
 
 def compare_placements(scene: DropScene, scheme: str, folder: Path) -> dict[str, float]:
-    """Return the difference between the histories of each placement and those of one rank."""
+    """Compare the histories of a drop on several ranks with its history on one rank.
+
+    Args:
+        scene: Meshes of the drop.
+        scheme: Coupling scheme, e.g. "held_velocity".
+        folder: Folder for the runs.
+
+    Returns:
+        Words for scheme, ranks and placement -> largest relative difference of an array.
+    """
     request = scene.request("two_scale", {"scheme": scheme}, SHOCK)
     reference, _ = launch(request, {"total": 1, "placement": "shared"}, folder / f"{scheme}_1")
     differences = {}
@@ -52,7 +61,17 @@ def compare_placements(scene: DropScene, scheme: str, folder: Path) -> dict[str,
 
 
 def measure_load_balance(scene: DropScene, scheme: str, folder: Path) -> dict[str, Any]:
-    """Return the load figures that the program reports for two ranks that share both models."""
+    """Return the load figures that the program reports for two ranks that share both models.
+
+    Args:
+        scene: Meshes of the drop.
+        scheme: Coupling scheme, e.g. "held_velocity".
+        folder: Folder for the run.
+
+    Returns:
+        ``busy_share`` and ``coupling_overhead`` (shares of the time), and ``window_seconds``, wall time of one exchange
+        interval.
+    """
     request = scene.request("two_scale", {"scheme": scheme}, SHOCK)
     _, result = launch(request, {"total": 2, "placement": "shared"}, folder / f"{scheme}_balance")
     return {
@@ -61,7 +80,15 @@ def measure_load_balance(scene: DropScene, scheme: str, folder: Path) -> dict[st
 
 
 def judge_ranks(figures: dict[str, dict]) -> dict[str, dict]:
-    """Return the limits on ranks with their measured values."""
+    """Compare the figures of runs on ranks with their limits.
+
+    Args:
+        figures: ``equality``, name -> difference, and ``balance``, scheme -> load figures, as ``main`` measures them.
+
+    Returns:
+        Name of a limit -> value, limit, sense of the comparison and whether it is satisfied, as ``turns.bar`` returns
+        it.
+    """
     bars = {f"equal histories: {name}": turns.bar(value, EQUAL, False) for name, value in figures["equality"].items()}
     for scheme, values in figures["balance"].items():
         bars[f"coupling overhead, {scheme}, 2 ranks shared"] = turns.bar(values["coupling_overhead"], OVERHEAD, False)
@@ -70,7 +97,11 @@ def judge_ranks(figures: dict[str, dict]) -> dict[str, dict]:
 
 
 def format_table(bars: dict[str, dict[str, dict]]) -> str:
-    """Format the limits of all results as a Markdown table."""
+    """Format limits as a Markdown table with one row each.
+
+    Args:
+        bars: Name of a benchmark -> name of a limit -> value, limit and result of ``turns.bar``.
+    """
     rows = [
         f"| {source} | {name} | {item['holds_if']} {item['limit']:.3g} | {item['value']:.3g} |"
         f" {'passed' if item['ok'] else 'FAILED'} |"
@@ -81,7 +112,11 @@ def format_table(bars: dict[str, dict[str, dict]]) -> str:
 
 
 def read_other_bars() -> dict[str, dict[str, dict]]:
-    """Return the limits in the results of the other benchmarks."""
+    """Return the stored limits of the other benchmarks; those without results are named on the terminal.
+
+    Returns:
+        Name of a benchmark -> name of a limit -> value, limit and result of ``turns.bar``.
+    """
     bars = {}
     for name in SOURCES:
         if figures := results.read_figures(name):
@@ -92,6 +127,7 @@ def read_other_bars() -> dict[str, dict[str, dict]]:
 
 
 def main() -> None:
+    """Run drops with every scheme on several ranks; store and print figures and limits."""
     schemes = ("held_velocity", "local_steps", "gravouil_combescure")
     with tempfile.TemporaryDirectory() as directory:
         folder = Path(directory)

@@ -30,7 +30,7 @@ DRIFT, MOMENTUM = 1e-3, 1e-10
 
 
 def sample_grid() -> Iterator[tuple[Pair, float]]:
-    """Yield pairs and step fractions."""
+    """Yield the samples: a pair of coupled models, and the time step over the critical step of its elements."""
     for substeps, impedance, ratio in product((1, 2, 3, 5, 8, 13, 24, 40), (0.1, 0.3, 1.0, 3.0, 10.0), RATIOS):
         yield Pair(substeps, impedance, ratio), 0.9
     for shape, substeps, impedance, ratio in product(("distorted", "curved"), (2, 12, 40), (0.1, 1.0, 10.0), RATIOS):
@@ -42,7 +42,12 @@ def sample_grid() -> Iterator[tuple[Pair, float]]:
 
 
 def measure_growths(pair: Pair, fraction: float) -> dict[str, float]:
-    """Return the spectral radius minus 1 for every scheme."""
+    """Return scheme -> growth of a window (the interval between two exchanges): its spectral radius minus 1.
+
+    Args:
+        pair: Macro and meso model: substeps, impedance ratio, shape.
+        fraction: Time step over the critical step.
+    """
     finer = pair.substeps > 1  # otherwise local steps equal the window
     chosen = {name: coupling for name, coupling in SCHEMES.items() if finer or coupling.scheme != "local_steps"}
     made = {name: pair.coupled(coupling, fraction) for name, coupling in chosen.items()}
@@ -51,7 +56,15 @@ def measure_growths(pair: Pair, fraction: float) -> dict[str, float]:
 
 
 def summarise_growths(rows: list[dict]) -> dict[str, dict]:
-    """Return the number of unstable samples and the largest growth of every scheme."""
+    """Summarise the growths of every scheme.
+
+    Args:
+        rows: Rows with ``pair`` (text), ``fraction`` and ``growth`` (scheme -> growth of a window).
+
+    Returns:
+        Scheme -> number of ``samples``, number of ``unstable`` ones, largest growth ``worst``, and the pair ``where``
+        it occurs.
+    """
     result = {}
     for name in (*SCHEMES, PRINTED):
         growth_of_pair = {row["pair"]: row["growth"][name] for row in rows if name in row["growth"]}
@@ -67,7 +80,16 @@ def summarise_growths(rows: list[dict]) -> dict[str, dict]:
 
 
 def judge_growths(result: dict) -> dict[str, dict]:
-    """Return the limits with their measured values."""
+    """Compare growths, energy drifts and momentum errors with their limits.
+
+    Args:
+        result: ``schemes`` (of ``summarise_growths``), ``long_runs`` (of ``run_long``) and ``momentum_error`` by
+            scheme.
+
+    Returns:
+        Name of a limit -> value, limit, sense of the comparison and whether it is satisfied, as ``turns.bar`` returns
+        it.
+    """
     schemes, momentum_errors = result["schemes"], result["momentum_error"]
     bars = {f"growth of a window, {name}": turns.bar(schemes[name]["worst"], GROWTH, False) for name in SCHEMES}
     bars[f"growth of a window, {PRINTED}"] = turns.bar(schemes[PRINTED]["worst"], GROWTH)
@@ -77,7 +99,14 @@ def judge_growths(result: dict) -> dict[str, dict]:
 
 
 def run_long(windows: int) -> dict[str, dict]:
-    """Return the energy drift and the largest interface energy after an undamped push."""
+    """Run a pair of models for many windows after an undamped push.
+
+    Args:
+        windows: Number of windows, the intervals between two exchanges.
+
+    Returns:
+        Scheme -> ``windows``, ``energy_drift`` and ``largest_interface_energy``, relative to the total energy.
+    """
     result = {}
     for name in ("held_velocity", "impulse", "local_steps"):
         coupled = Pair(3, 3.0, 2, layers=3).coupled(SCHEMES[name])

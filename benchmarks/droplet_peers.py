@@ -85,14 +85,14 @@ MEASURED = ((1.212, 1.443), (1.219, 1.474), (1.602, 1.884), (1.997, 2.292))
 
 
 def run_impacts() -> dict:
-    """Run every impact with both codes and draw their widths over time."""
+    """Run every impact with both codes and draw their widths; return name of the impact -> result of ``run_impact``."""
     spreads = {name: run_impact(impact_scene) for name, impact_scene in IMPACTS.items()}
     draw(spreads)
     return spreads
 
 
 def draw(spreads: dict) -> None:
-    """Plot the widths over time, one panel for each impact, with the range of measured correlations."""
+    """Plot the widths over time of each impact (name -> result of ``run_impact``) to a PNG file, one panel for each."""
     figure, panels = plt.subplots(1, len(spreads), figsize=(3.2 * len(spreads), 3.2), sharey=True, layout="constrained")
     for panel, (name, sides) in zip(panels, spreads.items(), strict=True):
         for side, label, line in (("delta_sph", "delta-SPH, 3D", "-"), ("interfoam", "interFoam, wedge", "--")):
@@ -109,13 +109,26 @@ def draw(spreads: dict) -> None:
 
 
 def run_impact(impact_scene: Impact) -> dict:
-    """Return the width over time [D / U] and the maximum width [D] of both codes."""
+    """Run one impact with both codes.
+
+    Args:
+        impact_scene: Liquid, Weber and Reynolds number, duration and resolution.
+
+    Returns:
+        ``delta_sph`` and ``interfoam``, the figures of ``summarise_width`` with number of particles or cells; None for
+        interFoam if it is not installed.
+    """
     scene = make_impact_scene(impact_scene, ANGLES[0])
     return {"delta_sph": impact_by_particles(scene), "interfoam": impact_by_interfoam(scene, CELLS)}
 
 
 def make_impact_scene(impact_scene: Impact, advancing: float) -> Droplet:
-    """Return the scene of an impact with an advancing contact angle [degrees]."""
+    """Return the parameters of an impact for this program.
+
+    Args:
+        impact_scene: Liquid, Weber and Reynolds number, duration and resolution.
+        advancing: Advancing contact angle [degrees].
+    """
     numerics = DropletNumerics(particles_per_diameter=impact_scene.across)
     angles = {"contact_angle": np.radians(ANGLES[0]), "advancing_angle": np.radians(advancing)}
     scene = Droplet(
@@ -125,7 +138,12 @@ def make_impact_scene(impact_scene: Impact, advancing: float) -> Droplet:
 
 
 def impact_by_particles(scene: Droplet) -> dict:
-    """Return the width over time computed by this program."""
+    """Compute an impact with this program.
+
+    Returns:
+        Number of ``particles`` and the figures of ``summarise_width``; ``seconds`` and the message ``broke`` if the
+        surface was lost.
+    """
     start = process_time()
     try:
         history = solve_droplet(scene).history
@@ -136,14 +154,31 @@ def impact_by_particles(scene: Droplet) -> dict:
 
 
 def summarise_width(time: np.ndarray, spread: np.ndarray, seconds: float) -> dict:
-    """Return the figures of a width over time."""
+    """Return the figures of a width over time.
+
+    Args:
+        time: Times, shape (n,) [D / U].
+        spread: Width over the diameter D, shape (n,).
+        seconds: Processor time of the run [s].
+
+    Returns:
+        Largest width ``spread_max`` and its time ``after``, ``seconds``, and lists ``time`` and ``spread``, rounded.
+    """
     widest = int(np.argmax(spread))
     figures = {"time": np.round(time, 4).tolist(), "spread": np.round(spread, 4).tolist()}
     return {"spread_max": float(spread[widest]), "after": float(time[widest]), "seconds": seconds} | figures
 
 
 def impact_by_interfoam(scene: Droplet, cells: int) -> dict | None:
-    """Return the width over time by interFoam with ``cells`` per diameter; None if it is not installed."""
+    """Compute an impact with interFoam; return None if it is not installed.
+
+    Args:
+        scene: Parameters of the impact.
+        cells: Number of cells across the diameter.
+
+    Returns:
+        ``version``, number of ``cells``, and the figures of ``summarise_width``.
+    """
     if shutil.which("interFoam") is None:
         print("interFoam is not installed (Debian package openfoam): skipping it")
         return None
@@ -175,7 +210,12 @@ def impact_by_interfoam(scene: Droplet, cells: int) -> dict | None:
 
 
 def measure_reach(alpha: np.ndarray, wedge: Wedge) -> float:
-    """Return the largest radius [m] of half-full cells, interpolated linearly between cells."""
+    """Return the largest radius of half-full cells, interpolated linearly between cells [m].
+
+    Args:
+        alpha: Volume fractions of the liquid, shape (rows, columns).
+        wedge: Mesh of cells.
+    """
     middles, largest = 0.5 * (wedge.edges[1:] + wedge.edges[:-1]), 0.0
     for fractions in alpha:
         full = np.flatnonzero(fractions >= 0.5)
@@ -188,14 +228,22 @@ def measure_reach(alpha: np.ndarray, wedge: Wedge) -> float:
 
 
 def run_widths() -> dict:
-    """Return the maximum widths of the fastest impacts by cells, contact angle and correlation."""
+    """Compute and draw the maximum widths of the fastest impacts; return name -> result of ``compare_widths``."""
     largest_widths = {name: compare_widths(IMPACTS[name]) for name in FAST}
     draw_widths(largest_widths)
     return largest_widths
 
 
 def compare_widths(impact_scene: Impact) -> dict:
-    """Return the maximum widths of one impact by both codes and by correlations."""
+    """Return the maximum widths of one impact by both codes and by correlations.
+
+    Args:
+        impact_scene: Liquid, Weber and Reynolds number, duration and resolution.
+
+    Returns:
+        Name of a correlation without angle -> width over diameter, and "A degrees" for each advancing angle A ->
+        figures of ``delta_sph``, of ``interfoam`` by number of cells, and widths by the other correlations.
+    """
     numbers, static = impact_scene[1:3], ANGLES[0]
     largest_widths: dict = {correlation.__name__: correlation(*numbers) for correlation in (roisman, laan)}
     for angle in ANGLES:
@@ -211,7 +259,7 @@ def compare_widths(impact_scene: Impact) -> dict:
 
 
 def draw_widths(largest_widths: dict) -> None:
-    """Plot the maximum widths over the advancing contact angle, one panel for each impact."""
+    """Plot the widths of each impact (name -> result of ``compare_widths``) over the contact angle to a PNG file."""
     figure, panels = plt.subplots(
         1, len(largest_widths), figsize=(4.0 * len(largest_widths), 3.4), layout="constrained"
     )
@@ -237,7 +285,12 @@ def draw_widths(largest_widths: dict) -> None:
 
 
 def run_dam_breaks() -> dict:
-    """Return the front of the dam break by both codes for each resolution."""
+    """Compute the dam break by both codes for each resolution.
+
+    Returns:
+        Number of particles over the height, as text -> ``delta_sph`` and, if it can be installed, ``pysph``: particles,
+        steps, processor seconds, particle-steps per second and errors of the front.
+    """
     there = install()
     return {
         str(count): {"delta_sph": run_dam_break(count)} | ({"pysph": run_pysph_dam_break(count)} if there else {})
@@ -246,7 +299,12 @@ def run_dam_breaks() -> dict:
 
 
 def run_dam_break(count: int) -> dict:
-    """Return the dam break by this program with ``count`` particles over the height."""
+    """Compute the dam break by this program with ``count`` particles over the height of the column.
+
+    Returns:
+        ``particles``, ``steps``, ``seconds`` (processor time), ``particle_steps_per_second`` and ``front_error``, a
+        list.
+    """
     scene = DamBreak(
         height=HEIGHT, width=WIDTH, tank_length=TANK, sensor_height=0.4, duration=FOLLOWED, density=1000.0,
         viscosity=1e-3, numerics=SphNumerics(particles_across=count),
@@ -260,7 +318,11 @@ def run_dam_break(count: int) -> dict:
 
 
 def run_pysph_dam_break(count: int) -> dict:
-    """Return the dam break by PySPH, whose particles also start half a spacing from the wall."""
+    """Compute the dam break by PySPH with ``count`` particles over the height, half a spacing from the wall.
+
+    Returns:
+        ``particles``, ``steps``, ``seconds``, ``particle_steps_per_second`` and ``front_error``, a list.
+    """
     spacing = HEIGHT / count
     with tempfile.TemporaryDirectory() as name:
         command = [str(PYTHON), str(Path(__file__).parent / "support" / "peer_pysph.py")]
@@ -275,7 +337,15 @@ def run_pysph_dam_break(count: int) -> dict:
 
 
 def front_errors(time: np.ndarray, front: np.ndarray) -> dict:
-    """Return the relative error of the front position at each measured time."""
+    """Compare the front of a dam break with measured positions.
+
+    Args:
+        time: Times, shape (n,) [s].
+        front: Position of the front from the wall behind the column, shape (n,) [m].
+
+    Returns:
+        ``front_error``, list of the relative error at each measured time.
+    """
     measured_positions = np.interp([at for at, _ in MEASURED], time * sqrt(2.0 * 9.81 / WIDTH), front / WIDTH)
     return {
         "front_error": [
@@ -286,7 +356,7 @@ def front_errors(time: np.ndarray, front: np.ndarray) -> dict:
 
 
 def steps_per_second(particles: int, steps: int, seconds: float) -> dict:
-    """Return the particle-steps of the liquid per second of one core."""
+    """Return ``particle_steps_per_second`` of one core: number of liquid particles times steps over seconds."""
     return {"particle_steps_per_second": particles * steps / seconds}
 
 

@@ -52,13 +52,21 @@ PAIRS = {
 
 
 def reflow_step(**changes: bool) -> Callable[[], object]:
-    """Return the step function of a cube of solder that keeps flowing on a wall."""
+    """Return a function that takes one step of a cube of solder that keeps flowing on a wall.
+
+    Args:
+        changes: Effect -> on or off, for effects other than those of a flow at rest.
+    """
     cloud = box_cloud(DROP.volume ** (1.0 / 3.0), PER_EDGE)
     return start_flow(cloud, DROP, RESTING | changes, (contact_line(cloud, 0, np.inf, DROP),)).step
 
 
 def drop_step(*loads: Load) -> Callable[[], object]:
-    """Return the explicit step function of a board under loads."""
+    """Return a function that takes one explicit step of a board under loads.
+
+    Args:
+        loads: Loads that act on the board.
+    """
     body, critical = BOARD
     motion = motion_of(body, 0.5 * critical, loads)
 
@@ -70,7 +78,13 @@ def drop_step(*loads: Load) -> Callable[[], object]:
 
 
 def force_step(material: Material, kinematics: Kinematics = "small", stretch: float = 0.0) -> Callable[[], object]:
-    """Return the force evaluation of a step of elements under increasing stretch."""
+    """Return a function that evaluates the internal force of a board's elements at a strain that grows with each call.
+
+    Args:
+        material: Material of all elements.
+        kinematics: "small" or "finite" strain.
+        stretch: Increment of the strain per call.
+    """
     body, _ = BOARD
     terms = force_terms(body.elements, [material], kinematics, 1e-8)
     points, result = body.local.points, np.zeros_like(body.local.points)
@@ -87,7 +101,7 @@ def force_step(material: Material, kinematics: Kinematics = "small", stretch: fl
 
 
 def make_sides() -> dict[str, Callable[[], object]]:
-    """Return the step function of each side."""
+    """Return the name of each side of the comparisons -> function that takes one step or evaluates one force."""
     body = BOARD[0]
     reflows = {PAIRS[name][2 - acts]: reflow_step(**{name: acts}) for name in LIQUID for acts in (True, False)}
     return reflows | {
@@ -104,7 +118,15 @@ def make_sides() -> dict[str, Callable[[], object]]:
 
 
 def compute_ratios(seconds: Mapping[str, np.ndarray]) -> dict[str, dict]:
-    """Return effect -> processor seconds with it over those without it, the median over rounds."""
+    """Return the cost of each effect.
+
+    Args:
+        seconds: Name of a side -> processor seconds of a call in each round, shape (rounds,).
+
+    Returns:
+        Effect -> ``ratio``, the median over the rounds of the seconds with the effect over those without, and ``of``,
+        the work that was measured.
+    """
     return {
         name: {"ratio": float(np.median(seconds[acting] / seconds[left_out])), "of": what}
         for name, (what, acting, left_out) in PAIRS.items()
@@ -112,6 +134,7 @@ def compute_ratios(seconds: Mapping[str, np.ndarray]) -> dict[str, dict]:
 
 
 def main() -> None:
+    """Measure all sides in turns; store the costs of the effects, also where the forecast of a run reads them."""
     seconds = turns.measure_in_turns({name: turns.make_batch(work) for name, work in make_sides().items()})
     cost_ratios = compute_ratios(seconds)
     MEASURED.write_text(json.dumps({"source": "benchmarks/effects.py", "effects": cost_ratios}, indent=1) + "\n")

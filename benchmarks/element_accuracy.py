@@ -118,7 +118,12 @@ class Problem:
 
 
 def solve_deflection(body: Body, equations: Equations) -> float:
-    """Return the largest deflection [m] under a uniform pressure of 1 Pa on the top."""
+    """Return the largest deflection of a body under a uniform pressure of 1 Pa on its top [m].
+
+    Args:
+        body: Elements, mass and supports.
+        equations: Equations of the body, which give its stiffness.
+    """
     local = body.local
     facets = boundary_facets(local.cells)[:, CYCLIC if local.cells.shape[1] == 8 else slice(None)]
     top = facets[np.all(local.points[facets][:, :, 2] > local.points[:, 2].max() - 1e-9, axis=1)]
@@ -132,14 +137,14 @@ def solve_deflection(body: Body, equations: Equations) -> float:
 
 
 def solve_problem(body: Body) -> dict:
-    """Return the deflection [m] and the first natural frequency [Hz]."""
+    """Return ``deflection`` [m] under 1 Pa on the top and first natural ``frequency`` [Hz] of a body."""
     equations = Equations.of(MPI.COMM_SELF, body)
     frequency = float(natural_modes(equations, 1).frequency[0])
     return {"deflection": solve_deflection(body, equations), "frequency": frequency}
 
 
 def time_step_of(motion: ExplicitMotion | ImplicitMotion) -> float:
-    """Return the processor seconds of a whole step, force included; best of three batches."""
+    """Return the processor seconds of a whole time step of a motion, force included; best of three batches."""
 
     def batch(steps: int) -> float:
         begin = process_time()
@@ -153,12 +158,19 @@ def time_step_of(motion: ExplicitMotion | ImplicitMotion) -> float:
 
 
 def explicit_motion(body: Body, step: float) -> ExplicitMotion:
-    """Return the motion of a body with explicit steps [s]."""
+    """Return a body at rest that moves without loads in explicit steps of ``step`` [s]."""
     return ExplicitMotion(body, [], step, np.empty(0, np.int32), np.zeros(len(body.mass)))
 
 
 def measure_speeds(cells: tuple[int, int]) -> dict:
-    """Return element updates per second of whole steps at small and finite strain for every kind of element."""
+    """Measure whole steps of a plate for every kind of element.
+
+    Args:
+        cells: Numbers of cells along and across the plate.
+
+    Returns:
+        Kind -> kinematics (small or finite strain) -> element updates per second of processor time.
+    """
     updates = {}
     for kind in KINDS:
         bodies = {name: Problem("plate", 0.3, cells, kind).body(name) for name in KINEMATICS}
@@ -169,7 +181,16 @@ def measure_speeds(cells: tuple[int, int]) -> dict:
 
 
 def measure_costs(body: Body, period: float) -> dict:
-    """Return the cost of one period [s] with either solver."""
+    """Measure the cost of one period with explicit and with implicit steps.
+
+    Args:
+        body: Elements, mass and supports.
+        period: Simulated time [s].
+
+    Returns:
+        ``elements``, ``unknowns``, ``critical_step`` [s], ``explicit_steps``, ``updates_per_second``, and processor
+        seconds ``explicit_seconds``, ``factor_seconds`` and ``implicit_seconds``.
+    """
     count = len(body.local.cells)
     critical = float(critical_steps(body.elements, body.geometry.nodal_volume).min())
     steps = int(np.ceil(period / (STEP_FRACTION * critical)))
@@ -190,7 +211,11 @@ def measure_costs(body: Body, period: float) -> dict:
 
 
 def mindlin_frequency(poisson: float) -> float:
-    """Return the first frequency [Hz] of the simply supported square plate, shear factor 5/6 (Mindlin 1951)."""
+    """Return the first frequency of the simply supported square plate [Hz], shear factor 5/6 (Mindlin 1951).
+
+    Args:
+        poisson: Poisson's ratio; the other properties are constants of the benchmark.
+    """
     wave = 2 * (np.pi / SIDE) ** 2
     shear = 5 / 6 * YOUNG / (2 * (1 + poisson)) * THICKNESS
     rigidity = YOUNG * THICKNESS**3 / (12 * (1 - poisson**2))
@@ -201,7 +226,15 @@ def mindlin_frequency(poisson: float) -> float:
 
 
 def measure(refinement: Refinement) -> Iterator[dict]:
-    """Yield the rows of one refinement: every kind at every size against the finest hexahedra."""
+    """Yield the rows of one refinement: every kind of element at every size against the finest hexahedra.
+
+    Args:
+        refinement: Problem, Poisson's ratio and mesh sizes.
+
+    Yields:
+        ``problem``, ``poisson_ratio``, ``kind``, ``cells``, relative ``deflection_error`` and ``frequency_error``, and
+        the figures of ``measure_costs``.
+    """
     exact = solve_problem(
         Problem(refinement.problem, refinement.poisson, refinement.finest, "incompatible_modes").body()
     )
@@ -219,14 +252,21 @@ def measure(refinement: Refinement) -> Iterator[dict]:
 
 
 def check_reference(refinements: tuple[Refinement, ...]) -> dict:
-    """Return the relative difference between the finest plate and Mindlin's frequency."""
+    """Return ``finest_plate_over_mindlin``: relative difference of the finest plate's first frequency to Mindlin's."""
     plate = next(refinement for refinement in refinements if refinement.problem == "plate")
     frequency = solve_problem(Problem("plate", plate.poisson, plate.finest, "incompatible_modes").body())["frequency"]
     return {"finest_plate_over_mindlin": frequency / mindlin_frequency(plate.poisson) - 1.0}
 
 
 def run_all(refinements: tuple[Refinement, ...]) -> dict:
-    """Run the refinements and store the results after each row."""
+    """Run the refinements, print their rows and store the results after each row.
+
+    Args:
+        refinements: Problems with their mesh sizes; one of them is the plate.
+
+    Returns:
+        ``rows`` of ``measure``, ``speeds`` of ``measure_speeds`` and ``finest_plate_over_mindlin``.
+    """
     next(measure(Refinement("plate", 0.3, ((2, 1),), (3, 1))))  # compiles the kernels of all rows
     speed = measure_speeds(refinements[-1].cells[-1])
     result = {"rows": [], "speeds": speed, **check_reference(refinements)}
@@ -239,7 +279,7 @@ def run_all(refinements: tuple[Refinement, ...]) -> dict:
 
 
 def format_cells(row: dict) -> list[str]:
-    """Format the cells of a row."""
+    """Format a row of ``measure`` as the texts of nine table cells."""
     return [
         f"{row['problem']}, nu {row['poisson_ratio']:g}",
         f"{row['elements']} {NAMES[row['kind']]}, {row['cells'][0]} x {row['cells'][1]}",
@@ -254,7 +294,7 @@ def format_cells(row: dict) -> list[str]:
 
 
 def format_seconds(value: float) -> str:
-    """Format seconds with two digits and without exponent."""
+    """Format a ``value`` in seconds with two digits, without exponent and with its unit."""
     return f"{value:.0f} s" if value >= 10 else f"{value:.2g} s"
 
 

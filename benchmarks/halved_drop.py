@@ -46,14 +46,27 @@ Measures = dict[str, float]
 
 
 def mesh_scene(size: float, folder: Path) -> DropScene:
-    """Mesh the scene with element sizes multiplied by ``size``."""
+    """Mesh the package and board of the drop with element sizes multiplied by ``size``.
+
+    Args:
+        size: Factor of the element sizes.
+        folder: Folder of the meshes.
+
+    Returns:
+        Meshes, with the inputs of runs on them.
+    """
     run = board_drop_study(read_case(CASES / NAME / "case.toml", SCENE)).parameters[0].run_at(size)
     sized = (f"{key}={value}" for key, value in run.settings.items() if key.startswith(("board.", "package.")))
     return DropScene.write(folder, (*SCENE, *sized), NAME)
 
 
 def measure_drop(size: float) -> dict:
-    """Run the drop on a mesh; return the peaks of the fine joint's measures as ``<measure>@<end>``."""
+    """Run the drop on a mesh whose element sizes are multiplied by ``size``.
+
+    Returns:
+        ``seconds``, ``elements``, ``window_ns``, ``substeps`` and ``values``: peaks over time of stress [Pa], section
+        forces [N, N m] and averages of the fine joint, named ``<measure>@<end>``.
+    """
     with tempfile.TemporaryDirectory() as folder:
         scene, coupling = mesh_scene(size, Path(folder)), {"fine_joints": [JOINT]}
         first, *others = (scene.request("two_scale", coupling, SHOCK | {"joint_layer": layer}) for layer in LAYERS)
@@ -80,7 +93,15 @@ def measure_drop(size: float) -> dict:
 
 
 def relative_changes(coarse: Measures, fine: Measures) -> Measures:
-    """Return the relative differences between two meshes; resultants over the section force (times radius)."""
+    """Return the relative differences of measures between two meshes, by their names.
+
+    Forces are relative to the section force of the fine mesh, moments to this force times the pad radius, others to
+    their own value.
+
+    Args:
+        coarse: Measures on the coarse mesh, named ``<measure>@<end>``.
+        fine: Measures on the fine mesh.
+    """
     scale = {}
     for end in ENDS:
         force = hypot(fine[f"axial_force@{end}"], fine[f"shear_force@{end}"])
@@ -91,6 +112,7 @@ def relative_changes(coarse: Measures, fine: Measures) -> Measures:
 
 
 def main() -> None:
+    """Run the drop on each mesh; store and print changes and fitted orders."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("sizes", nargs="*", type=float, help=f"element size factors, default {SIZES}")
     chosen = parser.parse_args().sizes or SIZES

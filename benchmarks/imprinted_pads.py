@@ -30,7 +30,16 @@ Measures = dict[str, float]
 
 
 def solve_patch(mesh: Mesh, yields: bool, angle: float | None = None) -> Measures:
-    """Return the measures of both ends as ``<measure>@<end>``."""
+    """Solve a joint between patches of board and substrate whose sides move.
+
+    Args:
+        mesh: Settings of the mesh.
+        yields: Whether the solder is plastic.
+        angle: Direction of the motion in plan [rad]; None for the motion along x.
+
+    Returns:
+        Section forces [N, N m] and averages at both ends of the joint, named ``<measure>@<end>``.
+    """
     whole, _ = patch(mesh)
     if angle is None and mesh.joint["core"] % 2 == 0 and not mesh.shift and mesh.swept:  # y = 0 is a line of the mesh
         whole = half_of(whole)
@@ -40,7 +49,15 @@ def solve_patch(mesh: Mesh, yields: bool, angle: float | None = None) -> Measure
 
 
 def describe_mesh(mesh: Mesh) -> dict:
-    """Return sizes, quality and critical steps of a mesh."""
+    """Return sizes, quality and critical steps of the mesh of a joint between patches.
+
+    Args:
+        mesh: Settings of the mesh.
+
+    Returns:
+        ``elements`` by part, smallest ``scaled_jacobian``, relative ``solder_volume_error`` and ``contact_area_error``,
+        and ``critical_steps`` by part [s].
+    """
     whole, joint = patch(mesh)
     data, elements = whole.mesh, Problem(whole, False).elements
     steps = critical_steps(elements, element_geometry(data.points, data.cells).nodal_volume)
@@ -55,7 +72,7 @@ def describe_mesh(mesh: Mesh) -> dict:
 
 
 def compare_meshes() -> dict:
-    """Return the properties and measures of each mesh."""
+    """Return the name of each mesh -> figures of ``describe_mesh``, and measures ``elastic`` and ``yielding``."""
     return {
         name: describe_mesh(mesh) | {"elastic": solve_patch(mesh, False), "yielding": solve_patch(mesh, True)}
         for name, mesh in MESHES.items()
@@ -63,9 +80,13 @@ def compare_meshes() -> dict:
 
 
 def compare_sizes() -> dict:
-    """Return the measures on three meshes, their differences and their Richardson limits.
+    """Solve the elastic and the yielding joint on three meshes.
 
     Moments are relative to the section force times the pad radius.
+
+    Returns:
+        ``elastic`` and ``yielding`` -> measures by element size, relative ``changes`` between sizes, and ``limits``:
+        Richardson's limit and order of each measure.
     """
     result = {}
     for name, yields in (("elastic", False), ("yielding", True)):
@@ -85,7 +106,11 @@ def compare_sizes() -> dict:
 
 
 def compare_rotations() -> dict:
-    """Return the measures under rotated motions and their differences to the motion along x."""
+    """Solve the elastic joint under motions in several directions.
+
+    Returns:
+        ``values``, angle in degrees -> measures, and ``changes``, their relative differences to the motion along x.
+    """
     rows = {f"{angle:g}": solve_patch(IMPRINTED, False, radians(angle)) for angle in ANGLES}
     first = next(iter(rows.values()))
     changes = {angle: _changes(row, first) for angle, row in rows.items()}

@@ -52,7 +52,7 @@ class Sample:
 
 
 def case_parameters(solder: Solder) -> dict[str, float | str]:
-    """Return the parameters that the OpenFOAM case includes."""
+    """Return the parameters of OpenFOAM's case, name -> word or number in SI units (contact angle in degrees)."""
     return {
         "contactAngle": ANGLE,
         "onWall": "slip",
@@ -67,7 +67,12 @@ def case_parameters(solder: Solder) -> dict[str, float | str]:
 
 
 def measure_samples(states: Iterable[State], solder: Solder) -> list[Sample]:
-    """Return the drop at each written time."""
+    """Measure height, width, volume and capillary number of the drop at each written time.
+
+    Args:
+        states: Fields that interFoam wrote, in order.
+        solder: Viscosity and surface tension.
+    """
     drop_samples = []
     for state in states:
         fastest = float(state.speed[state.alpha > 0.9].max())
@@ -77,9 +82,12 @@ def measure_samples(states: Iterable[State], solder: Solder) -> list[Sample]:
 
 
 def measure_extent(alpha: np.ndarray) -> tuple[float, float, float]:
-    """Return height [m], width at the wall [m] and volume [m^3] from volume fractions, shape (rows, columns).
+    """Return height [m], width at the wall [m] and volume [m^3] of a drop in a wedge of cells.
 
     The width at the wall is extrapolated from the radii of the two lowest rows.
+
+    Args:
+        alpha: Volume fraction of the liquid in each cell, shape (rows, columns).
     """
     radius = WEDGE.radii(alpha)
     volume = np.pi * WEDGE.cell * float((radius**2).sum())
@@ -87,7 +95,14 @@ def measure_extent(alpha: np.ndarray) -> tuple[float, float, float]:
 
 
 def find_rest(drop_samples: list[Sample]) -> tuple[Sample | None, list[Sample]]:
-    """Return the last third of the samples, and the first sample after which lengths stay near its means."""
+    """Find the sample from which on height and width stay near their means over the last third of the samples.
+
+    Args:
+        drop_samples: Samples in order of time: height, width and others.
+
+    Returns:
+        That sample, None if the drop does not come to rest, and the last third of the samples.
+    """
     third = drop_samples[-len(drop_samples) // 3 :]
     means = {name: np.mean([getattr(sample, name) for sample in third]) for name in ("height", "width")}
     moving = [
@@ -100,7 +115,16 @@ def find_rest(drop_samples: list[Sample]) -> tuple[Sample | None, list[Sample]]:
 
 
 def run_interfoam(solder: Solder, exact: Meridian) -> dict:
-    """Return time to rest and errors of interFoam."""
+    """Compute the drop by interFoam.
+
+    Args:
+        solder: Fluid and contact angle.
+        exact: Exact meridian of the drop.
+
+    Returns:
+        ``version``, ``cells``, ``seconds``, ``physical_time_to_rest`` [s] and ``seconds_to_rest`` (None without rest),
+        ``height_swing``, ``volume_error``, and the figures of ``relative_errors``.
+    """
     with tempfile.TemporaryDirectory() as name:
         log = interfoam.run_case(Path(name), WEDGE, case_parameters(solder), START)
         drop_samples = measure_samples(interfoam.read_states(Path(name), log, WEDGE), solder)
@@ -121,7 +145,14 @@ def run_interfoam(solder: Solder, exact: Meridian) -> dict:
 
 
 def run_particles(exact: Meridian) -> dict:
-    """Return time to rest and errors of this program, computed without inertia."""
+    """Compute the drop by this program without inertia.
+
+    Args:
+        exact: Exact meridian of the drop.
+
+    Returns:
+        ``particles``, ``steps``, ``seconds_to_rest`` (processor time), and the figures of ``relative_errors``.
+    """
     solder = molten_solder(SolderNumerics(time_step_limit=100.0))
     coarse, drop = (
         Drop(volume=VOLUME, contact_angle=solder.pad_contact_angle, particles_per_edge=count) for count in (5, PER_EDGE)
@@ -139,7 +170,17 @@ def run_particles(exact: Meridian) -> dict:
 
 
 def relative_errors(height: float, width: float, exact: Meridian, capillary_number: float) -> dict:
-    """Return signed relative errors and the remaining capillary number."""
+    """Return signed relative errors of a drop, and the capillary number of its remaining motion.
+
+    Args:
+        height: Height [m].
+        width: Largest width [m].
+        exact: Exact meridian.
+        capillary_number: Viscosity times speed over surface tension.
+
+    Returns:
+        ``height_error``, ``width_error`` and ``capillary_number``.
+    """
     return {
         "height_error": height / exact.height - 1.0,
         "width_error": width / exact.max_width - 1.0,
@@ -148,7 +189,7 @@ def relative_errors(height: float, width: float, exact: Meridian, capillary_numb
 
 
 def molten_solder(numerics: SolderNumerics | None = None) -> Solder:
-    """Return the solder of both codes."""
+    """Return the solder of both codes: volume, fluid and contact angle; default numerics if ``numerics`` is None."""
     return Solder(
         volume=VOLUME,
         pad_contact_angle=np.radians(ANGLE),

@@ -48,20 +48,20 @@ PAGE = os.sysconf("SC_PAGE_SIZE")
 
 
 def only_term(elements: Elements) -> ForceTerm:
-    """Return the single force term of a body of equal elements."""
+    """Return the single force term of elements of steel that all have the same kind."""
     (term,) = force_terms(elements, [STEEL])
     return term
 
 
 def linear_force(elements: Elements) -> Callable[[], object]:
-    """Return the force evaluation of linear elements."""
+    """Return a function that evaluates the internal force of linear elements at a random displacement."""
     term, displacement = only_term(elements), random_displacement(elements.points)
     force = np.zeros_like(displacement)
     return lambda: term.add(displacement, force)
 
 
 def corotational_force(elements: Elements) -> Callable[[], object]:
-    """Return the force evaluation of elastic hexahedra with a strain of 1e-3 and a rotation of 0.1."""
+    """Return a function that evaluates the force of elastic hexahedra at a strain of 1e-3 and a rotation of 0.1 rad."""
     (term,) = force_terms(elements, [STEEL], "corotational")
     turn = np.array([[np.cos(0.1), -np.sin(0.1), 0.0], [np.sin(0.1), np.cos(0.1), 0.0], [0.0, 0.0, 1.0]])
     moved = elements.points + random_displacement(elements.points, 1e-3)
@@ -70,7 +70,13 @@ def corotational_force(elements: Elements) -> Callable[[], object]:
 
 
 def plastic_force(elements: Elements, kinematics: Kinematics, strain: float) -> Callable[[], object]:
-    """Return the force evaluation of solder elements under increasing strain."""
+    """Return a function that evaluates the internal force of solder elements at a strain that grows from call to call.
+
+    Args:
+        elements: Hexahedra of solder.
+        kinematics: "small" or "finite" strain.
+        strain: Strain at the first call.
+    """
     (term,) = force_terms(elements, [SOLDER], kinematics, STEP)
     state, growth = (random_displacement(elements.points, part) for part in (strain, STEP * RATE))
     force = np.zeros_like(state)
@@ -83,7 +89,7 @@ def plastic_force(elements: Elements, kinematics: Kinematics, strain: float) -> 
 
 
 def petsc_product(elements: Elements) -> Callable[[], object]:
-    """Return the product of PETSc's blocked stiffness matrix and a displacement, as a function to call."""
+    """Return a function that multiplies the elements' stiffness, a blocked matrix of PETSc, by a displacement."""
     count = len(elements.points)
     matrix = PETSc.Mat().createBAIJ((3 * count, 3 * count), bsize=3, comm=MPI.COMM_SELF)
     matrix.setPreallocationNNZ(27)
@@ -98,7 +104,7 @@ def petsc_product(elements: Elements) -> Callable[[], object]:
 
 
 def dolfinx_assembly(mesh: MeshData) -> Callable[[], object]:
-    """Return the assembly of the internal force by DOLFINx, as a function to call."""
+    """Return a function that assembles the internal force of linear elastic hexahedra by DOLFINx."""
     space = dolfinx_api.vector_space(dolfinx_api.make_mesh(MPI.COMM_SELF, mesh.points, mesh.cells))
     displacement, test = dolfinx.fem.Function(space), ufl.TestFunction(space)
     displacement.x.array[:] = np.random.default_rng(0).uniform(-1, 1, len(displacement.x.array))
@@ -126,7 +132,7 @@ def array_bytes(term: ForceTerm) -> int:
 
 
 def measure_memory(elements: Elements) -> dict[str, float]:
-    """Return the bytes per element of a force term, counted over its arrays and as growth of the process."""
+    """Return the bytes per element of a force term: ``arrays``, counted, and ``resident``, growth of the process."""
     warm = elements.subset(np.arange(64))
     only_term(warm)
     before = resident_bytes()
@@ -144,7 +150,11 @@ def model_bytes(mesh: MeshData) -> float:
 
 
 def make_sides() -> tuple[dict[str, Callable[[], object]], dict[str, int]]:
-    """Return the force evaluations and their numbers of elements."""
+    """Prepare the works that are compared.
+
+    Returns:
+        Name of a side -> function that evaluates the force once, and name of a side -> number of its elements.
+    """
     boxes, mesh = cube(), cube(distorted=True)
     linear_elements = {
         "congruent": elements_of(boxes),
@@ -171,6 +181,7 @@ def make_sides() -> tuple[dict[str, Callable[[], object]], dict[str, int]]:
 
 
 def main() -> None:
+    """Measure speed and memory of all sides; store and print rates, ratios and limits."""
     meshes = {"congruent": cube(), "assembled": cube(distorted=True)}
     motion_of(dns_body(cube(edge=4), STEEL)[0], STEP)  # compiles
     memories = {name: measure_memory(elements_of(mesh)) for name, mesh in meshes.items()}

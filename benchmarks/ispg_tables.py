@@ -50,19 +50,41 @@ HEAVY = 4.985 / (8930.0 * 1e-6)
 
 
 def drop(count: int, degrees: float, *settings: str, name: str = "") -> Row:
-    """Return example 4.1 at another contact angle and resolution."""
+    """Return the row (name, case, settings) of example 4.1, a cube on a wall, at another contact angle and resolution.
+
+    Args:
+        count: Number of particles along an edge of the cube.
+        degrees: Contact angle [degrees].
+        settings: Further settings, as in the option ``--set``.
+        name: Words that are appended to the name of the row.
+    """
     drop_settings = (f"drop.contact_angle={degrees:g} deg", f"drop.particles_per_edge={count}", *settings)
     return Row(f"{count}, {degrees:g} deg{name and ', '}{name}", "sessile_drop", (*PAPER, *drop_settings))
 
 
 def heavy(count: int, degrees: float, bond: float, *settings: str) -> Row:
-    """Return the same drop under its weight."""
+    """Return the row of a cube on a wall that spreads under its weight; see ``drop`` for the common arguments.
+
+    Args:
+        count: Number of particles along an edge of the cube.
+        degrees: Contact angle [degrees].
+        bond: Bond number, weight over surface tension.
+        settings: Further settings, as in the option ``--set``.
+    """
     weight = ("gravity=on", f"solder.gravity={bond * HEAVY:.6g} m/s^2")
     return drop(count, degrees, *weight, *settings, name=f"Bond number {bond:g}")
 
 
 def between(count: int, receding: float, advancing: float, wall: str = "free slip", symmetry: str = "none") -> Row:
-    """Return the same cube on a wall with contact angle hysteresis."""
+    """Return the row of a cube on a wall with contact angle hysteresis.
+
+    Args:
+        count: Number of particles along an edge of the cube.
+        receding: Receding contact angle [degrees].
+        advancing: Advancing contact angle [degrees].
+        wall: Wall condition, a key of ``WALLS``, e.g. "free slip".
+        symmetry: Planes of symmetry: "none", "half" or "quarter".
+    """
     angles = f"receding_angle='{receding:g} deg',advancing_angle='{advancing:g} deg'"
     table = f"drop={{volume='1 mm^3',{angles},particles_per_edge={count},symmetry='{symmetry}'}}"
     name = f"{count}, {receding:g} to {advancing:g} deg, {wall}" + (f", {symmetry}" if symmetry != "none" else "")
@@ -70,33 +92,55 @@ def between(count: int, receding: float, advancing: float, wall: str = "free sli
 
 
 def ball(volume: float, count: int, wall: str = "free slip") -> Row:
-    """Return example 4.2 at another resolution."""
+    """Return the row of example 4.2, a drop on a pad, at another resolution.
+
+    Args:
+        volume: Volume [mm^3].
+        count: Number of particles along an edge of the initial cube.
+        wall: Wall condition, a key of ``WALLS``, e.g. "free slip".
+    """
     ball_settings = (f"drop.volume={volume} mm^3", f"drop.particles_per_edge={count}", *WALLS[wall])
     return Row(f"{count}, {volume} mm^3, {wall}", "bga_ball", (*PAPER, *ball_settings))
 
 
 def joint(spacing: float, name: str, *settings: str) -> Row:
-    """Return the solder joint case with other settings."""
+    """Return the row of the solder joint case with other settings.
+
+    Args:
+        spacing: Particle spacing [mm].
+        name: Words for the name of the row.
+        settings: Further settings, as in the option ``--set``.
+    """
     return Row(f"{spacing} mm, {name}", "solder_joint", (*PAPER, f"joint.spacing={spacing} mm", *settings))
 
 
 def standing(spacing: float, standoff: float) -> Row:
-    """Return a joint between fixed plates."""
+    """Return the row of a joint between fixed plates, from particle spacing and standoff [mm]."""
     return joint(spacing, f"{standoff:.2f} mm", f"joint.standoff={standoff} mm")
 
 
 def floating(free: str, *settings: str) -> Row:
-    """Return a package that floats on one joint under a load of 1 mN."""
+    """Return the row of a package that floats on one joint under a load of 1 mN.
+
+    Args:
+        free: Free directions, separated by ", ", e.g. "lift, shift".
+        settings: Further settings, as in the option ``--set``.
+    """
     return joint(0.06, free, f"joint.package={{load='1 mN',free={json.dumps(free.split(', '))}}}", *settings)
 
 
 def pulled(spacing: float, speed: float) -> Row:
-    """Return a package that is pulled off at a speed [mm/s]."""
+    """Return the row of a package that is pulled off, from particle spacing [mm] and speed [mm/s]."""
     return joint(spacing, f"{speed:g} mm/s", f"joint.path={{standoff='1.2 mm',speed='{speed:g} mm/s'}}")
 
 
 def swing(shells: int, steps: int) -> Row:
-    """Return a free drop of real solder with an amplitude of 0.1 R over two periods."""
+    """Return the row of a free drop of real solder that oscillates with an amplitude of 0.1 R over two periods.
+
+    Args:
+        shells: Number of shells of particles in the ball.
+        steps: Number of time steps per period.
+    """
     count = 1 + sum(10 * shell**2 + 2 for shell in range(1, shells + 1))
     oscillation_settings = (f"oscillation.particles_per_radius={shells}", f"oscillation.steps_per_period={steps}")
     return Row(
@@ -105,24 +149,30 @@ def swing(shells: int, steps: int) -> Row:
 
 
 def section(count: int, degrees: float, bond: float = 0.0) -> Row:
-    """Return the axisymmetric meridian of a drop."""
+    """Return the row of an axisymmetric drop computed in section.
+
+    Args:
+        count: Number of particles along an edge.
+        degrees: Contact angle [degrees].
+        bond: Bond number; 0 without weight.
+    """
     cut = "drop.section=axisymmetric"
     return heavy(count, degrees, bond, cut) if bond else drop(count, degrees, cut)
 
 
 def ridge(count: int, degrees: float) -> Row:
-    """Return a drop that is uniform along y."""
+    """Return the row of a drop that is uniform along y, from particles per edge and contact angle [degrees]."""
     return drop(count, degrees, "drop.section=plane")
 
 
 def real(count: int) -> Row:
-    """Return example 4.1 with real solder and inertia."""
+    """Return the row of example 4.1 with real solder and inertia at 60 degrees, from the particles per edge."""
     drop_settings = ("drop.contact_angle=60 deg", f"drop.particles_per_edge={count}")
     return Row(f"{count}, 60 deg", "sessile_drop", (*MOVES[:2], *drop_settings))
 
 
 def merging(spacing: float, on_wall: bool) -> Row:
-    """Return drops of 0.5 and 0.25 mm^3 that merge."""
+    """Return the row of drops of 0.5 and 0.25 mm^3 that merge, on a wall or free, from the particle spacing [mm]."""
     wall = ("drops.contact_angle=60 deg", "drops.distance=1.3 mm") if on_wall else ()
     name = f"{spacing:.2f} mm, {'60 deg' if on_wall else 'free'}"
     return Row(name, "coalescence", (*PAPER, "gravity=off", f"drops.spacing={spacing} mm", *wall))
@@ -205,7 +255,11 @@ COLUMNS = (
 
 
 def compute_and_judge(case: Molten) -> tuple[dict[str, tuple[float, str]], dict[str, dict]]:
-    """Compute a case; return its metrics under the program's names and its health checks."""
+    """Compute a case and judge its results.
+
+    Returns:
+        Metric name -> value and unit, and check name -> result of a health check, with the key ``ok``.
+    """
     match case:
         case DropCase():
             solution = drop_to_rest(case.drop, case.molten)
@@ -223,7 +277,12 @@ def compute_and_judge(case: Molten) -> tuple[dict[str, tuple[float, str]], dict[
 
 
 def compute(row: Row) -> dict[str, Any]:
-    """Return metrics [SI units], core-seconds and failed health checks of a row, or its error."""
+    """Compute the case of a row.
+
+    Returns:
+        Metrics by name in SI units, ``core_seconds``, and names of the failed health checks, ``unmet``; ``error``, its
+        message, and ``core_seconds`` if the case is refused or fails.
+    """
     begin = process_time()
     try:
         metrics, health = compute_and_judge(read_case(ROOT / "cases" / row.case / "case.toml", row.settings))
@@ -235,7 +294,12 @@ def compute(row: Row) -> dict[str, Any]:
 
 
 def format_row(name: str, figures: dict[str, Any]) -> str:
-    """Format a row for the terminal."""
+    """Format a row for the terminal.
+
+    Args:
+        name: Name of the row.
+        figures: Figures of ``compute``.
+    """
     if "error" in figures:
         return f"| {name} | {figures['error'][:120]} ({figures['core_seconds']:.0f} core-s)"
     cells = [f"{head} {text.format(factor * figures[key])}" for key, head, factor, text in COLUMNS if key in figures]

@@ -69,7 +69,12 @@ class Setting:
 
 
 def make_input(setting: Setting, directory: Path) -> StructureInput:
-    """Mesh the board and return the input of its run."""
+    """Mesh a quarter of the board and return the input of its run.
+
+    Args:
+        setting: Kind of element, cells, solver and numerics.
+        directory: Folder of the mesh and of the results.
+    """
     element, formulation = KINDS[setting.kind]
     layer = BoxLayer("board", THICKNESS, setting.cells[2])
     box = Box((LENGTH, WIDTH), setting.cells[:2], (layer,), ("x", "y"), element, BoxHoles(SPACING, HOLE))
@@ -100,7 +105,13 @@ def make_input(setting: Setting, directory: Path) -> StructureInput:
 
 
 def run_setting(setting: Setting) -> tuple[dict, dict[str, np.ndarray]]:
-    """Run a setting; return its costs, predicted and measured, and its history."""
+    """Run a setting on one rank.
+
+    Returns:
+        Costs: ``kind``, ``cells``, ``solver``, ``elements``, ``equations``, ``step_us``, ``steps``, measured
+        ``seconds`` and their parts, ``forecast_seconds``, ``energy_balance_error``, and ``factor`` (implicit) or
+        ``updates_per_second`` (explicit); and the history, name -> samples.
+    """
     with tempfile.TemporaryDirectory() as directory:
         request = make_input(setting, Path(directory))
         problem = StructureDynamics.read(MPI.COMM_SELF, request)
@@ -143,7 +154,12 @@ def run_setting(setting: Setting) -> tuple[dict, dict[str, np.ndarray]]:
 
 
 def with_errors(costs_and_history: tuple[dict, dict], reference: dict) -> dict:
-    """Return the costs of a run with its relative differences to a reference history."""
+    """Print the costs of a run and return them with ``displacement_error`` and ``strain_error`` at the centre.
+
+    Args:
+        costs_and_history: Result of ``run_setting``.
+        reference: History of the reference run; errors are relative to it.
+    """
     costs, history = costs_and_history
     errors = solver_differences(history, reference)
     named = {name: errors[f"{name}_difference@centre"] for name in ("displacement", "strain")}
@@ -158,7 +174,7 @@ def with_errors(costs_and_history: tuple[dict, dict], reference: dict) -> dict:
 
 
 def step_table(quick: bool) -> list[dict]:
-    """Return errors and costs over the step sizes on one mesh."""
+    """Return rows of ``with_errors`` over solvers and step sizes on one mesh; a coarse mesh if ``quick``."""
     cells = (11, 6, 2) if quick else (33, 19, 2)
     explicit = Setting("incompatible_modes", cells, "explicit", {})
     _, reference = run_setting(Setting("incompatible_modes", cells, "explicit", {"step_fraction": 0.09}))
@@ -172,13 +188,13 @@ def step_table(quick: bool) -> list[dict]:
 
 
 def mesh_table(quick: bool) -> list[dict]:
-    """Return errors and costs over element kinds, sizes and solvers."""
+    """Return rows of ``with_errors`` over element kinds, sizes and solvers; the coarsest meshes only if ``quick``."""
     _, reference = run_setting(Setting("incompatible_modes", (22, 13, 2) if quick else FINEST, "implicit", {}))
     return [with_errors(run_setting(setting), reference) for setting in mesh_settings(quick)]
 
 
 def mesh_settings(quick: bool) -> Iterator[Setting]:
-    """Yield the runs of ``mesh_table``."""
+    """Yield the settings of the runs of ``mesh_table``; those of the coarsest meshes only if ``quick``."""
     for kind, sizes in SIZES.items():
         for cells in sizes[:1] if quick else sizes:
             yield Setting(kind, cells, "explicit", {})
@@ -186,12 +202,20 @@ def mesh_settings(quick: bool) -> Iterator[Setting]:
 
 
 def factor_table(quick: bool) -> list[dict]:
-    """Return the cost of the MUMPS factor for boxes held on one side, with its prediction."""
+    """Return rows of ``factor_row`` for boxes of several sizes; the three smallest ones if ``quick``."""
     return [factor_row(cells) for cells in (BOXES[:3] if quick else BOXES)]
 
 
 def factor_row(cells: tuple[int, int, int]) -> dict:
-    """Return one row of ``factor_table``."""
+    """Measure the factorisation by MUMPS of the stiffness of a box held on one side, and its forecast.
+
+    Args:
+        cells: Numbers of elements along x, y and z.
+
+    Returns:
+        ``cells``, ``equations``, seconds of assembly, factor and one solve, memory, operations and entries of the
+        factor, their rates, and ``operations_forecast_ratio`` and ``entries_forecast_ratio``, forecast over measured.
+    """
     points, hexahedra = grid(*(np.arange(count + 1) * 1e-3 for count in cells))
     body, _ = dns_body(mesh_of(points, hexahedra, "board", {}), FR4)
     body.free[body.local.points[:, 0] < 1e-9] = False
@@ -232,12 +256,13 @@ def factor_row(cells: tuple[int, int, int]) -> dict:
 
 
 def find_blas() -> list[str]:
-    """Return the BLAS libraries that MUMPS calls, which determine the speed of the factorisation."""
+    """Return the paths of the BLAS libraries that this process has loaded, which determine the speed of MUMPS."""
     mapped = {line.split()[-1] for line in Path("/proc/self/maps").read_text().splitlines() if "libblas" in line}
     return sorted(str(Path(path).resolve()) for path in mapped)
 
 
 def main() -> None:
+    """Compute all tables; store them unless the meshes are coarse."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="coarse meshes; some seconds; writes nothing")
     quick = parser.parse_args().quick

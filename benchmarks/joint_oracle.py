@@ -35,24 +35,34 @@ Measures = dict[str, float]
 
 
 def make_oracle(mesh: str, yields: bool) -> Patch:
-    """Return the oracle's patch on one of its meshes."""
+    """Return the independent model of the joint between two patches.
+
+    Args:
+        mesh: Name of one of its meshes.
+        yields: Whether the solder is plastic.
+    """
     return Patch(PATCH, mesh_patch(PATCH, QUADRATIC[mesh], 2), yields)
 
 
 def make_program_patch(mesh: str | float, course: Course) -> ProgramPatch:
-    """Return the program's patch with pads imprinted on a mesh, or tied to boxes of a size [m]."""
+    """Return the program's model of the joint between two patches.
+
+    Args:
+        mesh: Name of a mesh with imprinted pads, or size of the boxes to which the joint is tied [m].
+        course: Course of the motion in time, and whether the solder yields.
+    """
     imprinted = isinstance(mesh, str)
     data = matching_mesh(PATCH, TRILINEAR[mesh]) if imprinted else box_mesh(PATCH, TRILINEAR["middle"], mesh, (8, 4))
     return ProgramPatch(PATCH, data, course)
 
 
 def find_peaks(history: list[Measures]) -> Measures:
-    """Return each measure at its largest absolute value."""
+    """Return each measure of a history, one dict of measures for each sample, at its largest absolute value."""
     return {name: max((row[name] for row in history), key=abs) for name in history[0] if name != "time"}
 
 
 def elastic_rows() -> dict[str, Callable[[], Measures]]:
-    """Return the rows of the elastic patch at rest."""
+    """Return the rows of the elastic patch at rest: name -> function that computes its measures."""
     rows = {
         f"oracle, {mesh}": lambda mesh=mesh: equilibrium(make_oracle(mesh, False))[-1] for mesh in reversed(QUADRATIC)
     }
@@ -64,7 +74,7 @@ def elastic_rows() -> dict[str, Callable[[], Measures]]:
 
 
 def yielding_rows() -> dict[str, Callable[[], Measures]]:
-    """Return the rows of the yielding patch at rest."""
+    """Return the rows of the yielding patch at rest: name -> function that computes its measures."""
     settings = [("middle", 5), ("coarse", 10), ("coarse", 5)]
     return {
         f"oracle, {mesh}, {steps} steps": lambda mesh=mesh, steps=steps: equilibrium(make_oracle(mesh, True), steps)[-1]
@@ -73,7 +83,7 @@ def yielding_rows() -> dict[str, Callable[[], Measures]]:
 
 
 def blow_rows() -> dict[str, Callable[[], Measures]]:
-    """Return the rows of the elastic patch under a pulse of 20 us."""
+    """Return the rows of the elastic patch under a pulse of 20 us: name -> function that computes the peaks."""
     return {
         f"oracle, {mesh}, {steps} steps": lambda mesh=mesh, steps=steps: find_peaks(
             steps_in_time(make_oracle(mesh, False), haversine(BLOW), BLOW / steps, steps)
@@ -86,7 +96,7 @@ def blow_rows() -> dict[str, Callable[[], Measures]]:
 
 
 def slow_rows() -> dict[str, Callable[[], Measures]]:
-    """Return the rows of the yielding patch under a pulse of 0.2 ms."""
+    """Return the rows of the yielding patch under a pulse of 0.2 ms: name -> function that computes the peaks."""
     return {
         f"oracle, {mesh}, {steps} steps": lambda mesh=mesh, steps=steps: find_peaks(
             steps_in_time(make_oracle(mesh, True), haversine(SLOW), SLOW / steps, round(SHARE * steps))
@@ -104,7 +114,14 @@ TABLES = {"elastic": elastic_rows, "yielding": yielding_rows, "blow": blow_rows,
 
 
 def measure_rows(rows: dict[str, Callable[[], Measures]]) -> dict[str, dict]:
-    """Compute the rows of a table and their differences to the first row."""
+    """Compute and print the rows of a table.
+
+    Args:
+        rows: Name of a row -> function that returns its measures; the first one is the reference.
+
+    Returns:
+        Name -> ``seconds`` (processor time), ``values`` (the measures) and relative ``differences`` to the first row.
+    """
     table: dict[str, dict] = {}
     for name, compute in rows.items():
         begin = process_time()

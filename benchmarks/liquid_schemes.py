@@ -54,33 +54,63 @@ def viscosity(ohnesorge: float) -> float:
 
 
 def ink(ohnesorge: float, across: int, **more) -> Droplet:
-    """Return a ball of the liquid for delta-SPH."""
+    """Return the parameters of a ball of the liquid for delta-SPH.
+
+    Args:
+        ohnesorge: Ohnesorge number, which sets the viscosity.
+        across: Number of particles across the diameter.
+        more: Further parameters of the droplet.
+    """
     numerics = DropletNumerics(particles_per_diameter=across)
     parameters = PAPER | {"diameter": 2.0 * RADIUS, "viscosity": viscosity(ohnesorge), "gravity": 0.0}
     return Droplet(**parameters | {"duration": 1.0} | more, numerics=numerics)
 
 
 def solder(ohnesorge: float) -> Fluid:
-    """Return the liquid for ISPG."""
+    """Return the same liquid for the scheme ispg, from its Ohnesorge number."""
     effects, numerics = FlowEffects(inertia="on"), SchemeNumerics(scheme="ispg")
     return Fluid(parameters="paper", viscosity=viscosity(ohnesorge), effects=effects, numerics=numerics)
 
 
 def measure_neck(points: np.ndarray, triangles: np.ndarray) -> float:
-    """Return the radius over R of a disc with the area of the smallest cross-section between drops that lie along x."""
+    """Return the radius of the neck between two drops that lie along x, over the radius R of a drop.
+
+    It is the radius of a disc with the area of the smallest cross-section.
+
+    Args:
+        points: Vertices of the surface, shape (m, 3) [m].
+        triangles: Outward oriented triangles, shape (t, 3).
+    """
     heights = np.linspace(-0.3, 0.3, 25) * RADIUS + 1e-9
     turned = np.ascontiguousarray(points[:, [1, 2, 0]])
     return float(np.sqrt(section_areas(turned, triangles, heights).min() / pi)) / RADIUS
 
 
 def measure_state(time: float, points: np.ndarray, triangles: np.ndarray, grown: bool) -> tuple[float, float, float]:
-    """Return time [sqrt(rho D^3 / gamma)], neck over R (inf once grown) and length over the merged diameter."""
+    """Return time [sqrt(rho D^3 / gamma)], neck over R, and length over the diameter of the merged drop.
+
+    Args:
+        time: Time [s].
+        points: Vertices of the surface, shape (m, 3) [m].
+        triangles: Outward oriented triangles, shape (t, 3).
+        grown: Whether the neck has reached its full width; it is then not measured, but infinite.
+    """
     length = float(np.ptp(points[:, 0])) / (2.0 * MERGED)
     return time / UNIT, np.inf if grown else measure_neck(points, triangles), length
 
 
 def summarise_merging(rows: list, points: np.ndarray, seconds: float) -> dict:
-    """Return growth rate of the neck, last swing and final radii of merged drops."""
+    """Summarise how two drops merged.
+
+    Args:
+        rows: Rows of ``measure_state``, one for each step.
+        points: Final vertices of the surface, shape (m, 3) [m].
+        seconds: Processor time [s].
+
+    Returns:
+        ``growth`` of the neck, time ``neck_grown_after``, ``last_swing`` of the length, mean and largest
+        ``radius_error`` of the merged sphere, and ``seconds``.
+    """
     time, width, length = np.array(rows).T
     low, high = (int(np.argmax(width > share)) for share in GROWTH)
     slope = np.polyfit(time[low:high], width[low:high] ** 2, 1)[0] if high > low + 1 else float("nan")
@@ -97,7 +127,15 @@ def summarise_merging(rows: list, points: np.ndarray, seconds: float) -> dict:
 
 
 def merge_by_sph(ohnesorge: float, across: int) -> dict:
-    """Merge two balls by delta-SPH, close enough to merge in the first step."""
+    """Merge two balls by delta-SPH, close enough to merge in the first step.
+
+    Args:
+        ohnesorge: Ohnesorge number of the liquid.
+        across: Number of particles across the diameter of a ball.
+
+    Returns:
+        ``particles``, ``steps``, ``volume_error``, and the figures of ``summarise_merging``.
+    """
     scene = ink(ohnesorge, across)
     simulation = make_pair(scene, TRACKED, 1.0, gap=0.9, speed=0.0)
     simulation.step(1e-9 * UNIT)  # compiles the kernels
@@ -112,7 +150,15 @@ def merge_by_sph(ohnesorge: float, across: int) -> dict:
 
 
 def merge_by_ispg(ohnesorge: float, in_radius: int) -> dict:
-    """Merge two touching balls by ISPG."""
+    """Merge two touching balls by the scheme ispg.
+
+    Args:
+        ohnesorge: Ohnesorge number of the liquid.
+        in_radius: Number of particles along the radius of a ball.
+
+    Returns:
+        ``particles``, ``steps``, ``volume_error``, and the figures of ``summarise_merging``.
+    """
     scene = Drops(
         volume_left=VOLUME, volume_right=VOLUME, distance=2.000002 * RADIUS, spacing=RADIUS / in_radius
     )  # fmt: skip
@@ -136,7 +182,16 @@ def merge_by_ispg(ohnesorge: float, in_radius: int) -> dict:
 
 
 def relax_cap_by_sph(ohnesorge: float, degrees: float, across: int) -> dict:
-    """Let a half sphere relax on a wall by delta-SPH."""
+    """Let a half sphere relax on a wall by delta-SPH.
+
+    Args:
+        ohnesorge: Ohnesorge number of the liquid.
+        degrees: Contact angle [degrees].
+        across: Number of particles across the diameter of the sphere.
+
+    Returns:
+        ``particles``, ``seconds`` (processor time), ``height_error`` and ``base_error``.
+    """
     scene = ink(ohnesorge, across, contact_angle=radians(degrees), duration=FOLLOWED * UNIT)
     begin = process_time()
     metrics = {name: value for name, (value, _) in solve_droplet(scene).metrics.items()}
@@ -145,7 +200,16 @@ def relax_cap_by_sph(ohnesorge: float, degrees: float, across: int) -> dict:
 
 
 def relax_cap_by_ispg(ohnesorge: float, degrees: float, per_edge: int) -> dict:
-    """Let a cube relax on a wall by ISPG."""
+    """Let a cube relax on a wall by the scheme ispg.
+
+    Args:
+        ohnesorge: Ohnesorge number of the liquid.
+        degrees: Contact angle [degrees].
+        per_edge: Number of particles along an edge.
+
+    Returns:
+        ``particles``, ``seconds`` (processor time), ``height_error``, ``max_width_error`` and ``at_rest``.
+    """
     drop = Drop(volume=VOLUME, contact_angle=radians(degrees), particles_per_edge=per_edge)
     begin = process_time()
     metrics = drop_to_rest(drop, solder(ohnesorge).resolve(drop, "off")).shape.metrics
@@ -154,14 +218,14 @@ def relax_cap_by_ispg(ohnesorge: float, degrees: float, per_edge: int) -> dict:
 
 
 def print_row(name: str, row: dict) -> dict:
-    """Print a row and return it."""
+    """Print the name and the figures of a row, and return the figures unchanged."""
     words = (f"{key} {value:.4g}" if isinstance(value, float) else f"{key} {value}" for key, value in row.items())
     print(f"  {name}:", "  ".join(words), flush=True)
     return row
 
 
 def run_merging() -> dict:
-    """Return the figures of merging by both schemes."""
+    """Merge two drops by both schemes at every size; return words for the run -> its figures."""
     rows = {}
     for ohnesorge in OHNESORGE:
         for scheme, run, sizes in (("delta-SPH", merge_by_sph, ACROSS), ("ISPG", merge_by_ispg, IN_RADIUS)):
@@ -172,7 +236,10 @@ def run_merging() -> dict:
 
 
 def run_caps() -> dict:
-    """Return the figures of caps by both schemes for the more viscous liquid, since the other one still swings."""
+    """Let caps relax by both schemes; return words for the run -> its figures.
+
+    Only the more viscous liquid is computed, since the other one still swings.
+    """
     rows, ohnesorge = {}, OHNESORGE[-1]
     for degrees in ANGLES:
         for scheme, run, size in (("delta-SPH", relax_cap_by_sph, ACROSS[-1]), ("ISPG", relax_cap_by_ispg, PER_EDGE)):

@@ -100,7 +100,7 @@ Bars = dict[str, dict[str, Any]]
 
 
 def measure_forces() -> tuple[Bars, dict]:
-    """Return element updates per second."""
+    """Return limits, and element updates per second of forces and steps by side (``updates_per_second``)."""
     boxes, small = cube(), cube(distorted=True, edge=12)
     body, critical = nonlinear_body(boxes, STEEL, ForceOptions("corotational", 1e-8), "incompatible_modes")
     motion = motion_of(body, 0.5 * critical)
@@ -141,13 +141,13 @@ def measure_forces() -> tuple[Bars, dict]:
 
 
 def akantu_loop(mesh, displacement: np.ndarray) -> "peers.Peer | None":
-    """Return Akantu with the linear cube; None if pip cannot install it."""
+    """Return a process of Akantu with an elastic body at a displacement (n, 3) [m]; None if pip cannot install it."""
     peers.FOLDER.mkdir(parents=True, exist_ok=True)
     return peers.Peer("akantu", peers.write_problem(mesh, displacement, 1e-8)) if "akantu" in peers.install() else None
 
 
 def compare_with_peers() -> tuple[Bars, dict]:
-    """Return whole steps in finite rotation over those of peers, from states with equal forces."""
+    """Return limits on the speed of whole steps over peers, from states with equal forces, and updates per second."""
     mesh, installed = cube(distorted=True, edge=12), peers.install()
     bars, rest = {}, {}
     for law, (material, strain, names, kinds) in PEERS.items():
@@ -170,7 +170,7 @@ def compare_with_peers() -> tuple[Bars, dict]:
 
 
 def move_body(mesh: MeshData, material: Material, kind: str, displacement: np.ndarray) -> ExplicitMotion:
-    """Return a body in finite rotation at a displacement [m], shape (n, 3), with its force there."""
+    """Return the motion of a body in finite rotation at a displacement [m], shape (n, 3), with its force there."""
     step = 0.5 * nonlinear_body(mesh, material, ForceOptions("corotational"), kind)[1]
     motion = motion_of(nonlinear_body(mesh, material, ForceOptions("corotational", step), kind)[0], step)
     motion.displacement[:] = displacement[motion.body.local.nodes]
@@ -179,7 +179,7 @@ def move_body(mesh: MeshData, material: Material, kind: str, displacement: np.nd
 
 
 def measure_bending() -> tuple[Bars, dict]:
-    """Return the accuracy lost by the one-point element."""
+    """Return limits on the accuracy lost by the one-point element, and moments of a plastic hinge over theory."""
     moments = {name: bent_moment(name, 4) for name in ("one_point", "incompatible_modes")}
     stiffness = [element_stiffness(elements_of(cube(True, 4), name)) for name in moments]
     difference = np.abs(stiffness[0] - stiffness[1]).max() / np.abs(stiffness[1]).max()
@@ -191,7 +191,7 @@ def measure_bending() -> tuple[Bars, dict]:
 
 
 def measure_effects() -> tuple[Bars, dict]:
-    """Return the cost of windows with each effect."""
+    """Return limits, and the cost of windows (exchange intervals) with each effect over linear ones."""
     with tempfile.TemporaryDirectory() as folder:
         scene = DropScene.write(Path(folder), (*REDUCED, MATERIAL))
         runs = {name: ProgramRun(scene.request("two_scale", *side)) for name, side in SIDES.items()}
@@ -205,14 +205,14 @@ def measure_effects() -> tuple[Bars, dict]:
 
 
 def seconds_of(runs: dict[str, ProgramRun]) -> dict[str, np.ndarray]:
-    """Return the processor seconds per simulated second of runs, measured in turns."""
+    """Return the processor seconds per simulated second of each run by name, one value for each round of turns."""
     for run in runs.values():
         run.step(STRETCH)
     return turns.measure_in_turns({name: lambda run=run: run.step(STRETCH) for name, run in runs.items()}, ROUNDS)
 
 
 def measure_interpreter() -> tuple[Bars, dict]:
-    """Return the Python overhead [s] of a substep of a meso model."""
+    """Return no limits, and the seconds of a substep of a meso model with and without the interpreter."""
     with tempfile.TemporaryDirectory() as folder:
         scene = DropScene.write(Path(folder), (*REDUCED, MATERIAL, "scale=quick"))
         run = ProgramRun(scene.request("two_scale", {"scheme": "held_velocity", "fine_joints": ["A4"]}, FINITE))
@@ -229,7 +229,7 @@ def measure_interpreter() -> tuple[Bars, dict]:
 
 
 def measure_two_scales() -> tuple[Bars, dict]:
-    """Return core-seconds of two scales over those of one model."""
+    """Return limits, and core-seconds of two scales over those of one model, with windows and sizes."""
     with tempfile.TemporaryDirectory() as folder:
         scene = DropScene.write(Path(folder), (*REDUCED, MATERIAL))
         runs = {
@@ -247,7 +247,7 @@ def measure_two_scales() -> tuple[Bars, dict]:
 
 
 def measure_errors(formulation: str = "one_point") -> tuple[Bars, dict]:
-    """Return errors of the critical joint against one model."""
+    """Return limits, and errors of the critical joint with two scales against one model, by number of fine joints."""
     shock = FINITE | {
         "formulation": formulation,
         "peak_acceleration": PEAK,
@@ -276,7 +276,7 @@ def measure_errors(formulation: str = "one_point") -> tuple[Bars, dict]:
 
 
 def measure_implicit() -> tuple[Bars, dict]:
-    """Return cost and errors of implicit steps for the pulse of ``errors`` and one five times as long."""
+    """Return no limits, and seconds and errors of implicit steps for the pulse of ``errors`` and a longer one."""
     rows: dict[str, dict] = {}
     for pulse in (PULSE, 5.0 * PULSE):
         shock = FINITE | {"peak_acceleration": PEAK, "pulse_duration": pulse, "history_samples": SPARSE}
@@ -302,7 +302,7 @@ def measure_implicit() -> tuple[Bars, dict]:
 
 
 def measure_drift() -> tuple[Bars, dict]:
-    """Return the energy drift of each scheme over many windows in finite rotation."""
+    """Return limits on the energy drift of each scheme over many windows in finite rotation, and the runs' sizes."""
     bars, rows = {}, {}
     for name, pair in DRIFTING.items():
         models = pair.divided(SCHEMES[name])
@@ -325,7 +325,7 @@ def measure_drift() -> tuple[Bars, dict]:
 
 
 def measure_growth(every: int = 1, formulation: str = "one_point") -> tuple[Bars, dict]:
-    """Return how many windows grow and the largest growth of each scheme, over every ``every``-th pair of the grid.
+    """Return limits on the windows that grow, by scheme, and the largest growths, over every ``every``-th pair.
 
     Each pair is stored in ``build`` when it is done, so that an interrupted run continues.
     """
@@ -349,7 +349,7 @@ def measure_growth(every: int = 1, formulation: str = "one_point") -> tuple[Bars
 
 
 def measure_window_growth(pair: Pair, fraction: float, formulation: str) -> dict[str, float]:
-    """Return the growth of a window by each scheme, and the number of step levels of the first scheme."""
+    """Return scheme -> spectral radius minus 1 of a window, and ``levels``, the step levels of the first scheme."""
     growth_rates: dict[str, float] = {}
     for name in ALONG_PATHS:
         coupled = flowing_pair(pair, SCHEMES[name], fraction, formulation)

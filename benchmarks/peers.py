@@ -78,7 +78,7 @@ class Peer:
 
 
 def install() -> list[str]:
-    """Install the peers; return the names of the available ones."""
+    """Install the other programs (peers) in an environment of their own; return the names of the available ones."""
     if not PYTHON.exists():
         venv.create(FOLDER / "venv", with_pip=True)
     installed = []
@@ -95,13 +95,13 @@ def install() -> list[str]:
 def write_problem(
     mesh: MeshData, displacement: np.ndarray, step: float, material: Isotropic = STEEL, finite: bool = False
 ) -> Path:
-    """Write the cube as input of a peer; return the file.
+    """Write a body at a displacement as input of a peer process (NPZ); return the path of the file.
 
     Args:
         mesh: Mesh of hexahedra.
         displacement: Nodal displacements [m], shape (n, 3).
         step: Time step [s].
-        material: Material of all elements, see ``model_arrays``.
+        material: Material of all elements; of its plasticity only the yield stress is used.
         finite: Whether strains are finite.
     """
     path = FOLDER / f"{'finite' if finite else 'small'}.npz"
@@ -111,7 +111,17 @@ def write_problem(
 
 
 def model_arrays(mesh: MeshData, material: np.ndarray, materials: Sequence[Isotropic]) -> dict[str, np.ndarray]:
-    """Return the arrays of a model for ``support/kratos_model.py``; plasticity enters by the yield stress only."""
+    """Return the arrays of a model for a peer process.
+
+    Args:
+        mesh: Mesh of hexahedra.
+        material: Number of the material of each cell, shape (ne,).
+        materials: Materials by number; of their plasticity only the yield stress is used.
+
+    Returns:
+        ``points`` [m], ``cells`` (nodes in cyclic order), ``material``, and ``constants``: density, Young's modulus,
+        Poisson's ratio and yield stress (nan if elastic) of each material.
+    """
     constants = [
         [item.density, item.young_modulus, item.poisson_ratio, item.plasticity.A if item.plasticity else np.nan]
         for item in materials
@@ -125,7 +135,16 @@ def model_arrays(mesh: MeshData, material: np.ndarray, materials: Sequence[Isotr
 
 
 def program_batches(mesh: MeshData, displacement: np.ndarray) -> tuple[dict[str, turns.Batch], np.ndarray, float]:
-    """Return this program's batches, its force at the displacement, and half the critical step [s]."""
+    """Prepare the works of this program on a cube.
+
+    Args:
+        mesh: Mesh of hexahedra.
+        displacement: Nodal displacements, shape (n, 3) [m].
+
+    Returns:
+        Name -> function that works and returns processor seconds per call; internal force at the displacement, shape
+        (n, 3) [N]; half the critical step [s].
+    """
     elements = elements_of(mesh)
     terms = {"congruent": CongruentElements.build(elements), "assembled": AssembledElements.build(elements)}
     force = np.zeros_like(displacement)
@@ -147,6 +166,7 @@ def program_batches(mesh: MeshData, displacement: np.ndarray) -> tuple[dict[str,
 
 
 def main() -> None:
+    """Measure this program and the peers in turns; store and print rates, ratios and limits."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     names = install()
     mesh = cube()

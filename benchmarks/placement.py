@@ -40,7 +40,16 @@ PREDICTION, OVERHEAD, BUSY = 0.3, 0.03, 0.9
 
 
 def measure(world: MPI.Comm, request: RunInput) -> dict:
-    """Return the prediction and the measured window times on all ranks."""
+    """Measure the windows (exchange intervals) of a run on all ranks; collective.
+
+    Args:
+        world: Communicator of all ranks.
+        request: Input of the run.
+
+    Returns:
+        Summary of the placement with the predicted time, ``substeps``, ``window_seconds``, ``measured / predicted``,
+        ``busy_shares`` by rank, ``busy_share``, ``coupling_overhead`` and ``load_average``; equal on all ranks.
+    """
     problem = PackageDrop.read(world, request)
     plan = problem.place(world)
     comms = Communicators(world, plan.placement)
@@ -68,7 +77,7 @@ def measure(world: MPI.Comm, request: RunInput) -> dict:
 
 
 def write_inputs(folder: Path) -> dict[str, RunInput]:
-    """Write the meshes to a folder; return the inputs of both schemes and of the nonlinear case on one rank."""
+    """Write the meshes to a folder; return the inputs of the coupling schemes and of the nonlinear case by name."""
     for name in ("linear", "nonlinear"):
         (folder / name).mkdir()
     scene = DropScene.write(folder / "linear")
@@ -79,7 +88,7 @@ def write_inputs(folder: Path) -> dict[str, RunInput]:
 
 
 def with_placements(inputs: dict[str, RunInput], size: int) -> dict[str, str]:
-    """Return the inputs with all placements on ``size`` ranks."""
+    """Return the inputs with all placements of models on ``size`` ranks: words for the run -> input as JSON text."""
     table = {}
     for name, request in inputs.items():
         for placement in ("shared", "disjoint") if size > 1 else ("shared",):
@@ -90,6 +99,7 @@ def with_placements(inputs: dict[str, RunInput], size: int) -> dict[str, str]:
 
 
 def main(counts: list[int]) -> None:
+    """Measure all placements on each number of ranks, print them and store them with their limits."""
     table: dict[str, dict] = {}
     with tempfile.TemporaryDirectory() as folder:
         inputs, path = write_inputs(Path(folder)), Path(folder) / "requests.json"
@@ -105,7 +115,15 @@ def main(counts: list[int]) -> None:
 
 
 def judge_placement(row: dict) -> dict:
-    """Return the limits of a placement; the busy share counts only where ranks share both models."""
+    """Compare the figures of a placement with their limits; the busy share counts only where ranks share both models.
+
+    Args:
+        row: Figures of ``measure``.
+
+    Returns:
+        Name of a limit -> value, limit, sense of the comparison and whether it is satisfied, as ``turns.bar`` returns
+        it.
+    """
     figures = {
         "error of the prediction": turns.bar(abs(row["measured / predicted"] - 1.0), PREDICTION, at_least=False),
         "coupling_overhead": turns.bar(row["coupling_overhead"], OVERHEAD, at_least=False),
@@ -114,7 +132,12 @@ def judge_placement(row: dict) -> dict:
 
 
 def measure_on_ranks(world: MPI.Comm, path: Path) -> None:
-    """Measure the inputs of a file and overwrite the file with the results."""
+    """Measure the inputs in a file and overwrite it with name -> figures of ``measure``; collective.
+
+    Args:
+        world: Communicator of all ranks.
+        path: File that holds the result of ``with_placements`` as JSON.
+    """
     inputs = json.loads(path.read_text())
     rows = {name: measure(world, RunInput.model_validate_json(text)) for name, text in inputs.items()}
     if world.rank == 0:

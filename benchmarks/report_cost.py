@@ -19,21 +19,28 @@ CASE, RUN = ROOT / "tests/pipeline/small.toml", ROOT / "build/report_cost"
 
 
 def run_small_case() -> Path:
-    """Run the shortened case unless it exists; return its folder."""
+    """Run the shortened case, which does nothing if its results are up to date; return its run folder."""
     line = [sys.executable, "-m", "reflowshock", "run", str(CASE), "--out", str(RUN)]
     subprocess.run(line, check=True, cwd=ROOT)
     return RUN
 
 
 def measure_cost(run: Path) -> dict:
-    """Write the report of a run in a separate process; return its cost."""
+    """Write the report of a run in a separate process; return its cost, as ``render_once`` measures it."""
     line = [sys.executable, __file__, "--one", str(run)]
     output = subprocess.run(line, check=True, cwd=ROOT, capture_output=True, text=True).stdout
     return json.loads(output.splitlines()[-1])
 
 
 def render_once(run: Path) -> dict:
-    """Write the report of a run into a temporary folder; return its cost."""
+    """Write the report of a run into a temporary folder and measure its cost.
+
+    Args:
+        run: Run folder; not changed.
+
+    Returns:
+        ``run`` (name), ``processor_seconds`` beyond loading, ``loading_seconds``, and ``bytes`` of the page.
+    """
     from reflowshock.workflow.pipeline.points import read_case_of_run
     from reflowshock.workflow.pipeline.report import write_report
 

@@ -41,7 +41,7 @@ NAP = 1e-3  # [s]
 
 
 def make_motion(comm: MPI.Comm, loads: list[Load]) -> ExplicitMotion:
-    """Return the cube at rest, distributed over the ranks."""
+    """Return the cube at rest under loads, distributed over the ranks of a communicator; collective."""
     item = prepare(cube(), "dns")["dns"]
     rank_elements = make_rank_elements(
         distribute(comm, item.mesh if comm.rank == 0 else None), item.tables, Materials(board=STEEL)
@@ -51,7 +51,7 @@ def make_motion(comm: MPI.Comm, loads: list[Load]) -> ExplicitMotion:
 
 
 def step_of(motion: ExplicitMotion) -> Callable[[], None]:
-    """Return a function that takes one whole step."""
+    """Return a function that takes one whole step of a motion, force included; collective on its ranks."""
 
     def work() -> None:
         motion.advance()
@@ -61,7 +61,7 @@ def step_of(motion: ExplicitMotion) -> Callable[[], None]:
 
 
 def force_of(motion: ExplicitMotion) -> Callable[[], None]:
-    """Return a function that evaluates the internal force."""
+    """Return a function that evaluates the internal force of a motion at its displacement, without communication."""
     scratch = np.zeros_like(motion.force)
 
     def work() -> None:
@@ -72,7 +72,7 @@ def force_of(motion: ExplicitMotion) -> Callable[[], None]:
 
 
 def measure_least_wall(comm: MPI.Comm, work: Callable[[], None]) -> float:
-    """Return the minimum wall seconds of a call on the slower rank."""
+    """Return the wall seconds of a call on the slower rank, the minimum over several calls; collective."""
     walls = np.empty(CALLS)
     for k in range(CALLS):
         comm.Barrier()
@@ -84,14 +84,19 @@ def measure_least_wall(comm: MPI.Comm, work: Callable[[], None]) -> float:
 
 
 def wait_asleep(comm: MPI.Comm) -> None:
-    """Wait for the other rank without using its core."""
+    """Wait at a barrier for the other rank, asleep, so that it can use the whole processor; collective."""
     request = comm.Ibarrier()
     while not request.Test():
         time.sleep(NAP)
 
 
 def measure(world: MPI.Comm) -> dict[str, float]:
-    """Return the minimum wall seconds of each work; single-rank values on rank 0 only."""
+    """Measure steps and forces on one rank and on two; collective.
+
+    Returns:
+        ``step_N`` and ``force_N`` on N ranks, and ``drop_1``, a step under a body force: minimum wall seconds; those of
+        one rank on rank 0 only.
+    """
     both = make_motion(world, [])
     works = {"step_2": (world, step_of(both)), "force_2": (world, force_of(both))}
     if world.rank == 0:
@@ -110,7 +115,14 @@ def measure(world: MPI.Comm) -> dict[str, float]:
 
 
 def report(least: dict[str, float]) -> dict:
-    """Return rates, ratios and limits."""
+    """Return the figures of the benchmark.
+
+    Args:
+        least: Minimum wall seconds of each work, as ``measure`` returns them.
+
+    Returns:
+        ``elements``, ``updates_per_second`` by work, ``load_average``, and ``bars``, ratios with their limits.
+    """
     count = len(cube().cells)
     pairs = {
         "step / force": ("force_1", "step_1", 0.8),
@@ -127,6 +139,7 @@ def report(least: dict[str, float]) -> dict:
 
 
 def main() -> None:
+    """Measure on two ranks, launched by MPI; store and print the figures."""
     command = mpi_command(2, [sys.executable, __file__, "ranks"], oversubscribe=False)
     done = subprocess.run(command, env=without_mpi_job(os.environ), stdout=subprocess.PIPE, text=True, check=True)
     results.write_and_print("step_scaling", json.loads(done.stdout))

@@ -58,13 +58,21 @@ def calibrate_strength() -> float:
 
 @cache
 def read_or_calibrate_strength() -> float:
-    """Return the stored strength, or calibrate it."""
+    """Return the strength of the pairwise forces over theory: the stored value, or a calibrated one without it."""
     figures = results.read_figures(NAME)
     return figures.get("strength") or calibrate_strength()
 
 
 def run_models(scene, sizes: tuple[int, ...]) -> dict:
-    """Run the scene with each model and size."""
+    """Run a scene with each model of surface tension and each size.
+
+    Args:
+        scene: Function of model, particles across the diameter and strength that returns figures.
+        sizes: Numbers of particles across the diameter.
+
+    Returns:
+        Model -> size as text -> figures of the scene.
+    """
     rows = {}
     for model in MODELS:
         rows[model] = {
@@ -78,7 +86,11 @@ def run_models(scene, sizes: tuple[int, ...]) -> dict:
 
 
 def measure_cost() -> dict:
-    """Return microseconds per particle-step of a drop at rest with each model, and the ratio to the tracked surface."""
+    """Return the cost of a drop at rest with each model of surface tension.
+
+    Returns:
+        Model -> ``us_per_particle_step`` and ``over_tracked``, the ratio to the tracked surface.
+    """
 
     def step_of(simulation):
         return make_batch(lambda: simulation.step(simulation.time_step()), 0.5)
@@ -98,7 +110,11 @@ def measure_cost() -> dict:
 
 
 def draw(figures: dict) -> None:
-    """Plot errors against core-seconds, one panel for each scene; failed runs are omitted."""
+    """Plot errors against core-seconds to a PNG file, one panel for each scene; failed runs are omitted.
+
+    Args:
+        figures: Scene -> result of ``run_models``.
+    """
     figure, panels = plt.subplots(1, len(figures), figsize=(3.4 * len(figures), 3.2), layout="constrained")
     for panel, (scene, sides) in zip(np.atleast_1d(panels), figures.items(), strict=True):
         name, exact, title = DRAWN[scene]

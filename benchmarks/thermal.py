@@ -55,7 +55,7 @@ BOARDS = {"as meshed for the shock, 0.5 mm": 0.5e-3, "as meshed for the shock, 2
 
 
 def mesh_package(cells: int, layers: int) -> MeshData:
-    """Return the quarter package with ``cells`` along the substrate and ``layers`` through substrate and die."""
+    """Return the quarter package in hexahedra: ``cells`` along the substrate, ``layers`` through each layer."""
     x = np.linspace(0.0, SUBSTRATE, cells + 1)
     points, hexahedra = grid(x, x, np.linspace(0.0, 2.0 * THICKNESS, 2 * layers + 1))
     centre = points[hexahedra].mean(axis=1)
@@ -67,13 +67,25 @@ def mesh_package(cells: int, layers: int) -> MeshData:
 
 
 def warpage(points: np.ndarray, displacement: np.ndarray) -> float:
-    """Return the rise [m] of the corner of the lower face over its centre."""
+    """Return the rise of the corner of the package's lower face over its centre [m].
+
+    Args:
+        points: Nodes, shape (n, 3) [m].
+        displacement: Displacements of the nodes, shape (n, 3) [m].
+    """
     ends = [np.argmin(np.linalg.norm(points - corner, axis=1)) for corner in ([SUBSTRATE, SUBSTRATE, 0.0], [0.0] * 3)]
     return float(displacement[ends[0], 2] - displacement[ends[1], 2])
 
 
 def solve_by_program(mesh: MeshData) -> tuple[float, dict]:
-    """Return warpage and costs of the program's hexahedra, with a detached cell of board that the tables require."""
+    """Heat a package in the program's hexahedra, with a detached cell of board that the program requires.
+
+    Args:
+        mesh: Quarter of the package.
+
+    Returns:
+        Warpage [m], and the costs ``equations`` and ``factor_bytes``.
+    """
     board = mesh_of(*grid([0.0, SUBSTRATE], [0.0, SUBSTRATE], [-2e-3, -1e-3]), "board", {"symmetry_x": on(0, 0.0)})
     both = append([board, mesh])
     model = Thermoelastic(MPI.COMM_SELF, both, thermal_tables(both, np.zeros(3)), ELASTIC)
@@ -84,7 +96,15 @@ def solve_by_program(mesh: MeshData) -> tuple[float, dict]:
 
 
 def solve_by_dolfinx(mesh: MeshData, degree: int) -> tuple[float, dict]:
-    """Return warpage and costs of Lagrange hexahedra of a degree assembled by DOLFINx."""
+    """Heat a package in Lagrange hexahedra of a polynomial degree that DOLFINx assembles.
+
+    Args:
+        mesh: Quarter of the package.
+        degree: Polynomial degree of the elements.
+
+    Returns:
+        Warpage [m], and the costs ``equations`` and ``factor_bytes``.
+    """
     domain = dolfinx_api.make_mesh(MPI.COMM_SELF, mesh.points, mesh.cells)
     kind = ("Lagrange", degree)
     old = dolfinx_api.OLD
@@ -110,13 +130,13 @@ def solve_by_dolfinx(mesh: MeshData, degree: int) -> tuple[float, dict]:
 
 
 def strain(field: ufl.core.expr.Expr) -> ufl.core.expr.Expr:
-    """Return the strain of a displacement, in Voigt order with engineering shear."""
+    """Return the strain of a displacement as a UFL vector: xx, yy, zz, xy, yz, xz with engineering shear."""
     e = ufl.sym(ufl.grad(field))
     return ufl.as_vector([e[0, 0], e[1, 1], e[2, 2], 2 * e[0, 1], 2 * e[1, 2], 2 * e[0, 2]])
 
 
 def symmetry_conditions(domain: dolfinx.mesh.Mesh, space: dolfinx.fem.FunctionSpace) -> list:
-    """Return the conditions of symmetry planes and the fixed height of one point."""
+    """Return the DOLFINx boundary conditions of the planes x = 0 and y = 0, and of the fixed height of the origin."""
     held = []
     for axis in range(3):
         part = space.sub(axis).collapse()[0]
@@ -139,7 +159,17 @@ SOLVERS = {
 
 
 def solve_on_mesh(kind: str, cells: int, layers: int) -> dict:
-    """Solve on a mesh; return warpage and costs."""
+    """Heat the package on one mesh.
+
+    Args:
+        kind: Kind of element, a key of ``SOLVERS``.
+        cells: Number of cells along the substrate.
+        layers: Number of cells through substrate and die each.
+
+    Returns:
+        ``kind``, ``cells``, ``layers``, ``warpage_um``, ``seconds`` (processor time), ``equations`` and
+        ``factor_bytes``.
+    """
     mesh = mesh_package(cells, layers)
     begin = process_time()
     warpage_value, costs = SOLVERS[kind](mesh)
@@ -155,7 +185,10 @@ def solve_on_mesh(kind: str, cells: int, layers: int) -> dict:
 
 
 def compare_meshes(quick: bool) -> list[dict]:
-    """Compare element kinds on meshes of the package."""
+    """Return the rows of ``solve_on_mesh`` of every kind and mesh with their relative ``error``, the reference last.
+
+    Fewer meshes are solved if ``quick``.
+    """
     for kind in SOLVERS:
         solve_on_mesh(kind, 5, 1)  # compiles
     exact = solve_on_mesh("quadratic", *((11, 2) if quick else REFERENCE))
@@ -172,7 +205,10 @@ def compare_meshes(quick: bool) -> list[dict]:
 
 
 def compare_boards(quick: bool) -> list[dict]:
-    """Compare boards of different mesh size."""
+    """Return the rows ``board``, ``elements`` and figures of ``measure_board`` of boards of different mesh size.
+
+    The finest board is left out if ``quick``.
+    """
     case = read_case(CASE, ['warpage.corner="0 mm"', "board.numerics.layers=6"], oversubscribe=True)
     pads = pads_of(pad_table(case.package, case.board, case.warpage))
     rows = []
@@ -195,7 +231,7 @@ def compare_boards(quick: bool) -> list[dict]:
 
 
 def pads_of(sites: list) -> Pads:
-    """Return the pads of a pad table."""
+    """Return names, positions [m] and wetted radii [m] of the pads in a table of ``PadSite``, for the thermal model."""
     lower = np.array([(site.x, site.y, site.z_board) for site in sites])
     upper = lower + np.array([(0.0, 0.0, site.gap) for site in sites])
     radii = np.array([(site.wetted_radius_board, site.wetted_radius_package) for site in sites])
@@ -203,7 +239,15 @@ def pads_of(sites: list) -> Pads:
 
 
 def measure_board(assembly: Assembly) -> dict:
-    """Assemble and solve once with wrenches; return costs and the opening of the corner joint's gap."""
+    """Assemble a heated package on its board and solve it with random wrenches on the pads.
+
+    Args:
+        assembly: Mesh file, pads, materials and heating.
+
+    Returns:
+        ``equations``, ``factor_mb``, ``factor_operations``, ``build_seconds``, ``solve_seconds``, and
+        ``corner_gap_um``, by which heating without wrenches opens the gap of the corner joint.
+    """
     begin = process_time()
     structure = ThermalStructure.build(MPI.COMM_SELF, assembly)
     built = process_time()

@@ -55,7 +55,12 @@ ROUNDS = 7
 
 
 def make_runs(scene: DropScene, names: list[str]) -> dict[str, ProgramRun]:
-    """Return the measured runs: settings, DNS, and the same DNS in implicit steps."""
+    """Return the runs that are measured, by name: settings of two scales, ``dns`` (one model), and ``implicit``.
+
+    Args:
+        scene: Meshes of the drop.
+        names: Names of the settings.
+    """
     runs = {name: ProgramRun(scene.request("two_scale", SETTINGS[name], {})) for name in names}
     runs["dns"] = ProgramRun(scene.request("dns", {}, {}))
     runs["implicit"] = ProgramRun(scene.request("dns", {}, {"dns_solver": "implicit"}))
@@ -63,7 +68,16 @@ def make_runs(scene: DropScene, names: list[str]) -> dict[str, ProgramRun]:
 
 
 def cost_table(scene: DropScene, names: list[str]) -> dict:
-    """Return the cost of each setting over the DNS, from processor seconds in turns."""
+    """Measure the cost of each setting over one model (DNS) by processor seconds in turns.
+
+    Args:
+        scene: Meshes of the drop.
+        names: Names of the settings.
+
+    Returns:
+        Setting -> ``time_ratio``, ``seconds_per_simulated_us``, ``setup_seconds``, ``whole_case_seconds``, ``elements``
+        by model, ``meso_share``, ``window_ns`` and ``substeps``.
+    """
     runs = make_runs(scene, names)
     for run in runs.values():
         run.step(STRETCH)
@@ -85,7 +99,17 @@ def cost_table(scene: DropScene, names: list[str]) -> dict:
 
 
 def error_table(scene: DropScene, names: list[str], shock: dict, folder: Path) -> dict:
-    """Return errors of each setting against a DNS with the same windows, and processor seconds."""
+    """Return errors of each setting against one model (DNS) with the same windows, and processor seconds.
+
+    Args:
+        scene: Meshes of the drop.
+        names: Names of the settings.
+        shock: Changes of the shock's parameters.
+        folder: Folder for the histories.
+
+    Returns:
+        Setting -> metrics of the comparison and ``seconds``; runs of the DNS have ``seconds`` only.
+    """
     rows: dict[str, dict] = {}
     references: dict[float, Path] = {}
     for name in names:
@@ -102,14 +126,23 @@ def error_table(scene: DropScene, names: list[str], shock: dict, folder: Path) -
 
 
 def write_history(run: ProgramRun, path: Path) -> tuple[Path, float]:
-    """Complete a run and write its history; return path and processor seconds."""
+    """Run to the end and write the history to an NPZ file; return its path and the processor seconds."""
     arrays, seconds = run.to_end()
     np.savez(path, **arrays)
     return path, seconds
 
 
 def judge(costs: dict[str, dict], errors: dict) -> dict:
-    """Return the limits with their measured values."""
+    """Compare time ratios and errors with their limits.
+
+    Args:
+        costs: Kind of kernels -> result of ``cost_table``.
+        errors: Result of ``error_table``.
+
+    Returns:
+        Name of a limit -> value, limit, sense of the comparison and whether it is satisfied, as ``turns.bar`` returns
+        it.
+    """
     bars = {}
     for name in set(BARS) & set(errors):
         limits = BARS[name]
@@ -122,6 +155,7 @@ def judge(costs: dict[str, dict], errors: dict) -> dict:
 
 
 def main() -> None:
+    """Measure costs and errors of the chosen settings; store and print them with their limits."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--full", action="store_true", help="meshes as large as those of H, the whole pulse; hours")
     parser.add_argument("--only", nargs="+", choices=SETTINGS, default=list(SETTINGS), help="of the settings")

@@ -37,7 +37,18 @@ ERRORS = ("critical_joint_stress_error", "die_displacement_error", "board_strain
 
 
 def run_setting(name: str, scene: DropScene, fraction: float, folder: Path) -> dict:
-    """Run a setting or ``dns``; return sizes, seconds and errors against the DNS of the same fraction."""
+    """Run a setting of two scales, or one model, and compare it with the one model of the same step fraction.
+
+    Args:
+        name: Name of a setting, or "dns" for one model, which must run first.
+        scene: Meshes of the drop.
+        fraction: Time step over the critical step.
+        folder: Folder for the histories.
+
+    Returns:
+        ``setting``, ``fraction``, ``window_ns``, substeps ``m``, meso share ``f``, ``seconds``, ``balance_error``, and
+        the relative errors named in ``ERRORS``.
+    """
     mode, coupling = ("dns", {}) if name == "dns" else ("two_scale", SETTINGS[name])
     run = ProgramRun(scene.request(mode, coupling, SHOCK | {"step_fraction": fraction}))
     arrays, seconds = run.to_end()
@@ -57,7 +68,7 @@ def run_setting(name: str, scene: DropScene, fraction: float, folder: Path) -> d
 
 
 def format_row(item: dict) -> str:
-    """Format a row of the table."""
+    """Format a row of ``run_setting`` with its ``time_ratio`` as a line of a Markdown table."""
     errors = " | ".join(f"{100.0 * item[metric]:.3f}" for metric in ERRORS)
     return (
         f"| {item['setting']} | {item['window_ns']:.1f} | {item['m']} | {item['f']:.2f} | {item['time_ratio']:.3f} |"
@@ -66,7 +77,7 @@ def format_row(item: dict) -> str:
 
 
 def fit_orders(rows: list[dict]) -> dict[str, dict[str, float]]:
-    """Return the fitted order in the window of each setting and metric."""
+    """Return setting -> metric -> order of the error in the window, fitted to the rows of ``run_setting``."""
     fitted_orders: dict[str, dict[str, float]] = {}
     for name in dict.fromkeys(item["setting"] for item in rows):
         mine = [item for item in rows if item["setting"] == name]
@@ -77,6 +88,7 @@ def fit_orders(rows: list[dict]) -> dict[str, dict[str, float]]:
 
 
 def main() -> None:
+    """Run all settings at several step fractions; print and store rows and orders."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="two windows only")
     fractions = FRACTIONS[:2] if parser.parse_args().quick else FRACTIONS

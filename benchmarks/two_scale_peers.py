@@ -120,19 +120,29 @@ SCENES = {
 
 
 def material_text(part: str, materials: Materials) -> str:
-    """Return the material of a part in Akantu's input format."""
+    """Return the material of a mesh part in Akantu's input format.
+
+    Args:
+        part: Name of the part, which begins with its role, e.g. "solder@A1".
+        materials: Material of each role.
+    """
     material = materials.by_role[part.split("@")[0].split("_")[0]]
     values = {"rho": material.density, "E": material.young_modulus, "nu": material.poisson_ratio}
     return "\n".join([f"material elastic [\n name = {part}", *(f" {key} = {values[key]:.17g}" for key in values), "]"])
 
 
 def heights_of_centres(arrays: dict[str, np.ndarray]) -> np.ndarray:
-    """Return the heights of board and die [m], shape (samples, 2), from a history."""
+    """Return the vertical displacements of the centres of board and die [m], shape (samples, 2), from a history."""
     return np.column_stack([arrays["board_centre"][:, 2], arrays["die_centre"][:, 2]])
 
 
 def compare_with_peer(scene: Scene) -> tuple[dict, dict]:
-    """Return limits and figures of a scene."""
+    """Run a shock by this program with one model and two scales, and by a peer, and compare errors and cost.
+
+    Returns:
+        Limits by name, and figures: elements, substeps, seconds per simulated us, errors against a fine mesh,
+        difference of peer and one model, and largest plastic strain.
+    """
     with tempfile.TemporaryDirectory() as directory:
         path, fine = Path(directory) / "package.msh", Path(directory) / "fine.msh"
         write_msh(conforming_package(), path)
@@ -162,6 +172,7 @@ def compare_with_peer(scene: Scene) -> tuple[dict, dict]:
 
 
 def main() -> None:
+    """Compare with each peer that can be installed; store and print figures and limits."""
     FOLDER.mkdir(parents=True, exist_ok=True)
     installed, result = install(), {"bars": {}}
     for name, scene in SCENES.items():

@@ -17,7 +17,7 @@ LONGEST_LIST = 60  # rows of a table; longer lists are data, not tables
 
 
 def benchmark_tables() -> Iterator[str]:
-    """Yield a section for each stored benchmark: purpose, conditions and figures."""
+    """Yield the Markdown lines of a page with a section for each stored benchmark: purpose, conditions and figures."""
     yield from ("# Results of benchmarks", "")
     yield "The last measurement of each script in [benchmarks](../../benchmarks/README.md). The load is the mean"
     yield from ("number of runnable processes over five minutes, at the start and the end.", "")
@@ -29,7 +29,7 @@ def benchmark_tables() -> Iterator[str]:
 
 
 def accuracy_tables() -> Iterator[str]:
-    """Yield a section for each stored convergence study: error against cost, orders, recommendation."""
+    """Yield the Markdown lines of a page of stored convergence studies: error against cost, orders, recommendation."""
     yield from ("# Error against cost", "", "Measured by `reflowshock accuracy` for the shipped cases.", "")
     for path in sorted((ROOT / "cases").glob("*/accuracy.json")):
         accuracy = read_accuracy(path)
@@ -43,7 +43,12 @@ def accuracy_tables() -> Iterator[str]:
 
 
 def table(head: Iterable[str], rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
-    """Yield a Markdown table, or nothing if it has no rows."""
+    """Yield the lines of a Markdown table, or nothing if it has no rows.
+
+    Args:
+        head: Titles of the columns.
+        rows: Cells of each row, as texts; vertical bars in them are escaped.
+    """
     cells = [[cell.replace("|", r"\|") for cell in row] for row in rows]
     if cells:
         titles = list(head)

@@ -26,7 +26,14 @@ PACKAGES = ("fem", "particles", "meshing", "workflow")
 
 
 def setup(app: Any) -> dict:
-    """Write the generated pages and register the renderer of equations."""
+    """Write the generated pages and register the renderer of equations; Sphinx calls it when it loads the extension.
+
+    Args:
+        app: Sphinx application.
+
+    Returns:
+        Properties of the extension for Sphinx.
+    """
     write_pages(ROOT / "docs/generated")
     app.add_html_math_renderer("mathml", (_inline_equation, _leave), (_equation, _leave))
     app.connect("html-page-context", lambda *event: event[3].update(sourcename=""))
@@ -35,7 +42,7 @@ def setup(app: Any) -> dict:
 
 
 def write_pages(folder: Path) -> None:
-    """Write every generated page that has changed."""
+    """Write every generated page that has changed as ``NAME.md`` into a folder, which is created if it is missing."""
     folder.mkdir(exist_ok=True)
     pages = {"gallery": gallery(), "keys": keys(), "commands": commands(), "figures": figures(), "rooms": rooms()}
     pages |= {"effects": effects(), "benchmarks": benchmark_tables(), "accuracy": accuracy_tables()}
@@ -47,7 +54,7 @@ def write_pages(folder: Path) -> None:
 
 
 def gallery() -> Iterator[str]:
-    """Yield a section for each case that has pictures."""
+    """Yield the Markdown lines of a page with a section for each case that has pictures."""
     yield from ("# Gallery", "", "Pictures of the cases that ship with the program.", "")
     for path in CASES:
         pictures = re.findall(r"!\[([^\]]+)\]\(([\w.]+)\)", path.read_text())
@@ -60,7 +67,7 @@ def gallery() -> Iterator[str]:
 
 
 def keys() -> Iterator[str]:
-    """Yield the reference of all keys: a section for each table of each kind of case."""
+    """Yield the Markdown lines of the reference of all keys: a section for each table of each kind of case."""
     schema = case_schema()
     yield from ("# Keys of case files", "")
     yield 'Generated from `reflowshock schema`. A quantity is a string with a unit, such as `"0.48 mm"`;'
@@ -74,7 +81,7 @@ def keys() -> Iterator[str]:
 
 
 def commands() -> Iterator[str]:
-    """Yield a section for each command with its purpose and examples."""
+    """Yield the Markdown lines of a page with a section for each command: its purpose and examples."""
     from typer.main import get_command
 
     from reflowshock.workflow.cli import app
@@ -87,7 +94,7 @@ def commands() -> Iterator[str]:
 
 
 def effects() -> Iterator[str]:
-    """Yield the table of all effects that the page on theory includes."""
+    """Yield the Markdown lines of the table of all effects, which the page on theory includes."""
     rows = (
         (
             effect.name.replace("_", " "),
@@ -102,7 +109,7 @@ def effects() -> Iterator[str]:
 
 
 def figures() -> Iterator[str]:
-    """Yield fitted orders, results of each case, and the tests against exact or independent solutions."""
+    """Yield the Markdown lines of a page with fitted orders, results of each case, and tests against exact values."""
     yield from ("# Figures of validation", "", "## Orders of convergence", "")
     yield "Fitted by `reflowshock accuracy`, stored in `accuracy.json` of the case: $e(h) = C h^p$ with the order $p$."
     yield from ("", *table(("case", "parameter", "error", "order", "theory"), _orders()))
@@ -116,7 +123,7 @@ def figures() -> Iterator[str]:
 
 
 def rooms() -> Iterator[str]:
-    """Yield the contents of each room of the program, from its docstring."""
+    """Yield the Markdown lines of a page with the contents of each room (folder) of the program, from its docstring."""
     yield from ("# Rooms", "", "Folders of the program and their contents.", "")
     for package in PACKAGES:
         yield from (f"## [{package}](../../{package}/README.md)", "")

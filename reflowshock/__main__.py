@@ -4,7 +4,7 @@ from reflowshock.workflow.process.error_exit import handle_signals, one_line_err
 
 
 def main() -> None:
-    """Prepare the process, then load and run the command line."""
+    """Run the command line of the program with the arguments of the process; it prepares threads and caches first."""
     with one_line_errors():
         handle_signals()
         from reflowshock.workflow.process.environment import prepare, restart_in_utf8

@@ -50,7 +50,7 @@ def write_data(path: Path, header: Mapping[str, Any], value: object) -> None:
 
 
 def read_header(path: Path) -> dict[str, Any]:
-    """Return the header of a file of ``write_data``, the mapping that was given to it, without reading the rest.
+    """Return the header that ``write_data`` wrote into a file, without reading the rest.
 
     Raises:
         NotData: The file has no valid header.
@@ -67,11 +67,11 @@ def read_header(path: Path) -> dict[str, Any]:
 
 
 def read_data(path: Path, records: Collection[type] = ()) -> Any:
-    """Return the value in a file.
+    """Return the value that ``write_data`` wrote into a file; reading runs no code from the file.
 
     Args:
         path: File that ``write_data`` has written.
-        records: Dataclasses and pydantic models that may be in it.
+        records: Dataclasses and pydantic models that may be in it; others raise an error.
 
     Raises:
         NotData: The file was modified, or contains records of other types.
@@ -130,7 +130,11 @@ def columns(rows: Sequence[Mapping[str, Any]]) -> dict[str, NDArray]:
 
 
 def rows(table: Mapping[str, NDArray]) -> list[dict[str, Any]]:
-    """Return the rows of a table made by ``columns``, each key -> plain value; arrays stay arrays."""
+    """Return the rows of a table, each key -> plain Python value or array; the inverse of ``columns``.
+
+    Args:
+        table: Key -> values of all rows, shape (k, ...).
+    """
     parts = [column.tolist() if column.ndim == 1 else list(column) for column in table.values()]
     return [dict(zip(table, row, strict=True)) for row in zip(*parts, strict=True)]
 

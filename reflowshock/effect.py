@@ -98,7 +98,7 @@ def decide_all(effects: Iterable[Effect[Scene]], scene: Scene) -> dict[str, Deci
 
     Args:
         effects: Effects to decide on.
-        scene: Parameters that the ``decide`` of these effects takes.
+        scene: Parameters of the case, which ``decide`` of each effect takes.
 
     Returns:
         Effect name -> decision (state, reason and expected influence), in the given order.

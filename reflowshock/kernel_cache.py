@@ -27,7 +27,10 @@ KERNEL_MODULES = tuple(f"{__package__}.{name}." for name in PACKAGES)
 
 
 def install_locator() -> None:
-    """Put ``ModuleCacheLocator`` before Numba's own locators, now or when Numba is loaded; idempotent."""
+    """Let Numba index the compiled kernels of this program by module and source digest instead of by path.
+
+    It takes effect now or when Numba is loaded; further calls change nothing.
+    """
     if CACHING_MODULE in sys.modules:
         _insert_locator(sys.modules[CACHING_MODULE])
     elif not any(isinstance(finder, _ImportHook) for finder in sys.meta_path):
@@ -97,6 +100,9 @@ def source_cache(folder: Path) -> Path:
     """Return the subfolder of a kernel cache for the present sources and version of Numba; the folder is not created.
 
     Versions of Numba without locators that can be replaced use ``folder`` itself.
+
+    Args:
+        folder: Folder with the compiled kernels of all versions.
     """
     version = _compiler()
     return folder / f"numba-{version}" / digest() if _has_locator_classes(version) else folder

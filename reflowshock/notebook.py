@@ -88,7 +88,7 @@ def run_html(summary: Mapping[str, Any], title: str, picture: bytes | None) -> s
 
 
 def heading(name: str, title: str) -> str:
-    """Return the HTML of name and title of a case, escaped."""
+    """Return the HTML of name and title of a case, which are escaped."""
     return f"<p><b>{escape(name)}</b> {escape(title)}</p>"
 
 

@@ -62,7 +62,11 @@ def unknown_name(key: str, name: str, valid: Iterable[str], what: str) -> Iterat
 
 
 def as_toml(value: object) -> str:
-    """Return a value as TOML text; tables are abbreviated."""
+    """Return a value of a case file as TOML text for messages; tables are abbreviated.
+
+    Args:
+        value: Text, number, boolean, list or table.
+    """
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
@@ -77,10 +81,10 @@ def as_toml(value: object) -> str:
 
 
 def shorten(text: str) -> str:
-    """Return a text cut to at most ``LONGEST`` characters."""
+    """Return a text, cut to at most ``LONGEST`` characters for messages if it is longer."""
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"
 
 
 def one_line(text: str) -> str:
-    """Replace unprintable characters, such as control characters, by escapes."""
+    """Return a text with unprintable characters, such as line breaks and control characters, replaced by escapes."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

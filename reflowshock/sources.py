@@ -7,7 +7,11 @@ MATERIALS = Path(__file__).parent / "materials"  # material laws compiled into k
 
 
 def digest_of_sources(*folders: Path) -> bytes:
-    """Return a digest of all Python files below some folders, since kernels use constants of any module."""
+    """Return the SHA-256 digest of the contents of all Python files below some folders, 32 bytes.
+
+    Args:
+        folders: Folders that are searched with their subfolders, in this order.
+    """
     sha256 = hashlib.sha256()
     for folder in folders:
         for path in sorted(folder.rglob("*.py")):

@@ -35,7 +35,7 @@ class UnitError(ValueError):
 
 @cache
 def registry() -> "pint.UnitRegistry":
-    """Return the unit registry; G is the standard acceleration of gravity, and mil is 0.001 inch."""
+    """Return Pint's unit registry, in which ``G`` is the standard acceleration of gravity and ``mil`` is 0.001 inch."""
     import pint
 
     # With decimals, "0.04 mm" and "40 um" give the same float.
@@ -82,7 +82,7 @@ def to_si(text: object, unit: str) -> float:
 
 
 def quantity_in_si(value: float, unit: str) -> float:
-    """Return the SI value of a number in a unit of any dimension."""
+    """Return the value in SI base units of a number in a unit, e.g. 0.001 for 1 and "mm"; any dimension is allowed."""
     return float(_in_base_units(Decimal(repr(float(value))), registry().Unit(unit)))
 
 
@@ -98,7 +98,12 @@ def from_si(value: float, unit: str, digits: int = 10) -> str:
 
 
 def in_unit(value: float, unit: str) -> float:
-    """Return the magnitude of an SI value in a unit, e.g. 0.48 for 4.8e-4 in "mm"; inf and nan do not change."""
+    """Return an SI value as a number in another unit, e.g. 0.48 for 4.8e-4 and "mm"; inf and nan do not change.
+
+    Args:
+        value: Value in SI base units.
+        unit: Unit of the result.
+    """
     if not math.isfinite(value):
         return value
     parsed, base = _with_its_base(unit)
@@ -114,7 +119,7 @@ def _with_its_base(unit: str) -> "tuple[pint.Unit, pint.Unit]":
 
 @lru_cache(maxsize=1024)
 def dimension(unit: "str | pint.Unit") -> str:
-    """Return the name of a unit's dimension, such as "length" for "mm", or its formula."""
+    """Return the name of a unit's dimension, e.g. "length" for "mm", or its formula if it has no name."""
     parsed = registry().Unit(unit)
     if parsed.dimensionless:
         return "angle" if str(parsed) in ANGLES else "pure number"

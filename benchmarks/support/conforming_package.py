@@ -21,7 +21,11 @@ RADIUS, COPPER_THICKNESS, GAP, LAYER = 0.2e-3, 2e-5, 0.3e-3, 0.4e-3
 
 
 def conforming_package(refinement: int = 1) -> MeshData:
-    """Return the mesh; each element is divided into ``refinement`` elements in each direction."""
+    """Return the mesh of a quarter of a package on its board, with parts and facet sets; all parts share their nodes.
+
+    Args:
+        refinement: Number of elements into which each element is divided, in each direction.
+    """
     top = GAP + 2 * COPPER_THICKNESS
     levels = [(-THICKNESS, 4), (0.0, 1), (COPPER_THICKNESS, 4), (COPPER_THICKNESS + GAP, 1), (top, 2), (top + LAYER, 2)]
     z = grid_lines([level for level, _ in levels] + [top + 2 * LAYER], [count * refinement for _, count in levels])
@@ -39,21 +43,39 @@ def conforming_package(refinement: int = 1) -> MeshData:
 
 
 def in_plane_lines(length: float, refinement: int) -> np.ndarray:
-    """Return the grid lines along one side: through the joints' edges and axes, then half a millimetre apart."""
+    """Return the grid lines along one side: through the joints' edges and axes, then half a millimetre apart.
+
+    Args:
+        length: Length of the board along this side [m].
+        refinement: Number of elements into which each element is divided.
+
+    Returns:
+        Increasing coordinates, shape (k,) [m].
+    """
     joints = [value for centre in (0.5e-3, 1.5e-3) for value in (centre - RADIUS, centre, centre + RADIUS)]
     breaks = [0.0, *joints[:3], 1e-3, *joints[3:], PACKAGE, length]
     return grid_lines(breaks, [refinement] * 8 + [refinement * round((length - PACKAGE) / 0.5e-3)])
 
 
 def grid_lines(breaks: Sequence[float], counts: Sequence[int]) -> np.ndarray:
-    """Return grid lines with ``counts`` equal elements between breaks."""
+    """Return grid lines with equal elements between breaks, shape (k,) [m].
+
+    Args:
+        breaks: Increasing coordinates of the breaks [m].
+        counts: Number of elements between each two successive breaks.
+    """
     gaps = zip(pairwise(breaks), counts, strict=True)
     pieces = [np.linspace(low, high, count + 1)[:-1] for (low, high), count in gaps]
     return np.append(np.concatenate(pieces), breaks[-1])
 
 
 def assign_parts(centre: np.ndarray, top: float) -> np.ndarray:
-    """Return the part of each cell by its centre, an empty name outside."""
+    """Return the name of each cell's part, such as "board" or "solder@A1", shape (c,); empty outside all parts.
+
+    Args:
+        centre: Centres of the cells, shape (c, 3) [m].
+        top: Height of the package's underside above the board [m].
+    """
     x, y, z = centre.T
     part = np.full(len(centre), "", dtype=object)
     part[z < 0.0] = "board"
@@ -69,7 +91,7 @@ def assign_parts(centre: np.ndarray, top: float) -> np.ndarray:
 
 
 def with_pads(mesh: MeshData) -> MeshData:
-    """Return the mesh with the facet sets between solder and copper."""
+    """Return the mesh with the facet sets between solder and copper, ``pad_board@NAME`` and ``pad_package@NAME``."""
     facets = dict(mesh.facets)
     for name in JOINTS:
         solder = mesh.cells[mesh.in_parts(f"solder@{name}".__eq__)]

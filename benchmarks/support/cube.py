@@ -23,7 +23,12 @@ SHAKE = 0.2  # largest move of inner nodes of the distorted cube, over the edge
 
 
 def cube(distorted: bool = False, edge: int = EDGE) -> MeshData:
-    """Return the mesh, of one part ``board``."""
+    """Return the mesh of a cube of hexahedra, all of the part ``board``.
+
+    Args:
+        distorted: Whether inner nodes are moved at random, so that no element is a box.
+        edge: Number of elements along an edge.
+    """
     line = np.linspace(0.0, LENGTH, edge + 1)
     points, cells = grid(line, line, line)
     if distorted:
@@ -34,7 +39,13 @@ def cube(distorted: bool = False, edge: int = EDGE) -> MeshData:
 
 
 def elements_of(mesh: MeshData, kind: str = "incompatible_modes", material: Material = STEEL) -> Elements:
-    """Return the elements of a mesh of hexahedra, each cut into six tetrahedra for tetrahedral kinds."""
+    """Return the elements of a mesh of hexahedra, with one material.
+
+    Args:
+        mesh: Mesh of hexahedra.
+        kind: Kind of element; for tetrahedral kinds each hexahedron is cut into six tetrahedra.
+        material: Material of all elements.
+    """
     points, cells = mesh.points, mesh.cells
     if KINDS[kind].nodes != 8:
         cells = cells[:, diagonal_tetrahedra()[1]].reshape(-1, 4)
@@ -44,5 +55,10 @@ def elements_of(mesh: MeshData, kind: str = "incompatible_modes", material: Mate
 
 
 def random_displacement(points: np.ndarray, strain: float = 1e-4) -> np.ndarray:
-    """Return displacements [m], shape (n, 3), that differ between neighbours by about a strain times an edge."""
+    """Return displacements that differ at random between neighbours, by about a strain times an edge, shape (n, 3) [m].
+
+    Args:
+        points: Nodes of the cube, shape (n, 3) [m].
+        strain: Size of the strain.
+    """
     return np.random.default_rng(1).uniform(-0.5, 0.5, points.shape) * strain * LENGTH / EDGE

@@ -88,17 +88,29 @@ class DropScene:
 
 
 def pad_sites(case: BoardDropCase) -> list[PadSite]:
-    """Return the joints of a case."""
+    """Return positions and sizes of the pads of all joints of a case, row by row."""
     return pad_table(case.package, case.board, case.warpage)
 
 
 def mesh_barrel(case: BoardDropCase, site: PadSite, mesher: Mesher, side: PackageSide) -> JointMesh:
-    """Return the mesh of a joint."""
+    """Return the mesh of a joint whose solder is a barrel of the case's volume.
+
+    Args:
+        case: Package and solder.
+        site: Positions and sizes of the pads.
+        mesher: Function that meshes a closed surface at a site, e.g. ``mesh_joint``.
+        side: Underside of the package.
+    """
     return mesher(make_barrel(site, case.solder.volume), site, case.package, side)
 
 
 def make_barrel(site: PadSite, volume: float) -> ClosedSurface:
-    """Return the barrel of a volume [m^3] that fills the gap between the wetted discs of a joint."""
+    """Return the closed surface of a barrel of solder that fills the gap between the wetted discs of a joint.
+
+    Args:
+        site: Gap and wetted radii of the joint.
+        volume: Volume of the barrel [m^3].
+    """
     lower, upper = site.wetted_radius_board, site.wetted_radius_package
 
     def excess(bulge: float) -> float:

@@ -65,7 +65,7 @@ def run_case(folder: Path, wedge: Wedge, parameters: Mapping[str, Any], start: s
 
     Args:
         folder: Empty folder.
-        wedge: Cells.
+        wedge: Size and numbers of cells.
         parameters: Further parameters that the case includes.
         start: Regions of ``setFieldsDict`` with their values.
     """
@@ -88,7 +88,13 @@ def _openfoam(command: str, folder: Path) -> str:
 
 
 def read_states(folder: Path, log: str, wedge: Wedge) -> Iterator[State]:
-    """Yield the fields of each written time in order."""
+    """Yield time, run time, volume fractions and speeds at each written time, in order.
+
+    Args:
+        folder: Folder in which ``run_case`` ran.
+        log: Log of interFoam, which ``run_case`` returned.
+        wedge: Size and numbers of cells.
+    """
     clock = {float(time): float(seconds) for time, seconds in CLOCK.findall(log)}
     times, shape = np.array(sorted(clock)), (wedge.rows, wedge.columns)
     for path in sorted((path for path in folder.iterdir() if _is_time(path.name)), key=lambda path: float(path.name)):
@@ -100,7 +106,7 @@ def read_states(folder: Path, log: str, wedge: Wedge) -> Iterator[State]:
 
 
 def read_version(log: str) -> str:
-    """Return the build named in a log."""
+    """Return the version (build) of OpenFOAM that a log of interFoam names."""
     return re.search(r"^Build\s*:\s*(.+)$", log, re.MULTILINE)[1]
 
 

@@ -29,8 +29,9 @@ def explicit_model(problem: dict[str, np.ndarray]) -> tuple[Kratos.ModelPart, Ca
     """Return a body at rest in its initial state, and the function that advances it by one step.
 
     Args:
-        problem: Arrays ``points``, ``cells`` (cyclic order), ``material`` of each cell, ``constants`` of the materials
-            (density, Young's modulus, Poisson's ratio, yield stress or nan), flag ``finite`` strain, ``step`` [s].
+        problem: Arrays ``points`` [m], ``cells`` (nodes in cyclic order), ``material`` of each cell, ``constants`` of
+            the materials (density, Young's modulus, Poisson's ratio, yield stress or nan), flag ``finite`` strain,
+            ``step`` [s].
     """
     Kratos.Logger.GetDefaultOutput().SetSeverity(Kratos.Logger.Severity.WARNING)
     finite, step = bool(problem["finite"]), float(problem["step"])
@@ -63,7 +64,13 @@ model = Kratos.Model()  # owns the parts and must outlive them
 
 
 def fill(body: Kratos.ModelPart, problem: dict[str, np.ndarray], finite: bool) -> None:
-    """Add materials, nodes and elements."""
+    """Add materials, nodes and elements to a model of Kratos.
+
+    Args:
+        body: Empty model, changed in place.
+        problem: Arrays of ``explicit_model``.
+        finite: Whether strains are finite.
+    """
     materials = [material_of(body, number, row, finite) for number, row in enumerate(problem["constants"], start=1)]
     for number, point in enumerate(problem["points"].tolist(), start=1):
         body.CreateNewNode(number, *point)
@@ -76,7 +83,14 @@ def fill(body: Kratos.ModelPart, problem: dict[str, np.ndarray], finite: bool) -
 
 
 def material_of(body: Kratos.ModelPart, number: int, row: np.ndarray, finite: bool) -> Kratos.Properties:
-    """Return a material: J2 without hardening if it has a yield stress, otherwise linear elastic."""
+    """Add a material to a model of Kratos and return it: J2 without hardening if it yields, else linear elastic.
+
+    Args:
+        body: Model, changed in place.
+        number: Number of the material.
+        row: Density [kg/m^3], Young's modulus [Pa], Poisson's ratio, yield stress [Pa] or nan, shape (4,).
+        finite: Whether strains are finite.
+    """
     properties = body.CreateNewProperties(number)
     for variable, value in zip(COLUMNS, row.tolist(), strict=True):
         if np.isfinite(value):

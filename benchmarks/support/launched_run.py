@@ -13,7 +13,19 @@ COMPARED = ("board_centre", "die_centre", "von_mises_board", "von_mises_package"
 
 
 def launch(request: RunInput, ranks: dict, output: Path) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Run an input on ``ranks`` (values of ``shock.ranks``); return its history and its result."""
+    """Run an input on several ranks.
+
+    Args:
+        request: Input of the run.
+        ranks: Values of ``shock.ranks``: ``total`` and ``placement``.
+        output: Folder of the results, which is created.
+
+    Returns:
+        History, name -> samples, and contents of ``result.json``.
+
+    Raises:
+        RuntimeError: The run failed.
+    """
     output.mkdir(parents=True)
     tables = request.model_dump(mode="json")
     tables["shock"]["ranks"] |= ranks
@@ -27,5 +39,10 @@ def launch(request: RunInput, ranks: dict, output: Path) -> tuple[dict[str, np.n
 
 
 def largest_difference(values: dict[str, np.ndarray], reference: dict[str, np.ndarray]) -> float:
-    """Return the largest difference of two histories, relative to the largest value of each array."""
+    """Return the largest difference of two histories, relative to the largest value of each array.
+
+    Args:
+        values: Arrays of one history by name, of which those in ``COMPARED`` are used.
+        reference: Arrays of the other history, of equal shapes.
+    """
     return max(float(np.abs(values[name] - reference[name]).max() / np.abs(reference[name]).max()) for name in COMPARED)

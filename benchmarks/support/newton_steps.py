@@ -28,7 +28,12 @@ CONVERGED, SMALL = 1e-4, 1e-5  # residual relative to the start of a step, and t
 
 
 def with_step(term: ForceTerm, step: float) -> ForceTerm:
-    """Return a force term whose path continues by another step [s]."""
+    """Return a force term whose state of plasticity continues with another time step.
+
+    Args:
+        term: Force term; terms of linear elements are returned unchanged.
+        step: Time step [s].
+    """
     if not isinstance(term, NonlinearElements):
         return term
     path = Path(term.path.finite, step)
@@ -36,7 +41,10 @@ def with_step(term: ForceTerm, step: float) -> ForceTerm:
 
 
 def take_implicit_steps(run: ProgramRun, step: float) -> "NewtonMotion":
-    """Switch a run of one model at rest to implicit steps of at most ``step`` [s], with unchanged samples."""
+    """Switch a run of one model at rest, in place, to implicit steps of at most ``step`` [s]; return its motion.
+
+    The times of the samples stay unchanged.
+    """
     [(role, participant)] = run.participants.items()
     run.plan = implicit_plan(run.plan, step)
     motion = NewtonMotion(participant.motion.body, participant.motion._loads, run.plan.step)

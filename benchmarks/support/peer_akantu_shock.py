@@ -23,7 +23,7 @@ time = 0.0
 
 
 def advance() -> None:
-    """Take one step under the half sine."""
+    """Take one step of the global model under the half sine of the acceleration, and advance the global time."""
     global time
     time += step
     share = time / float(inputs["pulse"])

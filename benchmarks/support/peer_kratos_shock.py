@@ -18,7 +18,7 @@ pulse, peak, step = (float(inputs[name]) for name in ("pulse", "peak", "step"))
 
 
 def advance_under_load() -> None:
-    """Take one step under the half sine, with the load at its beginning."""
+    """Take one step of the global model under the half sine of the acceleration, with the load at its beginning."""
     share = body.ProcessInfo[Kratos.TIME] / pulse
     load = Kratos.Array3([0.0, 0.0, peak * np.sin(np.pi * share) if share < 1.0 else 0.0])
     Kratos.VariableUtils().SetVariable(Kratos.VOLUME_ACCELERATION, load, body.Nodes)

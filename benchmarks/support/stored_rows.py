@@ -34,7 +34,7 @@ class StoredRows:
 
 
 def digest_of(parameters: object) -> str:
-    """Return a digest of the parameters and of all measured source files."""
+    """Return a digest of parameters, by their ``repr``, and of all measured source files, 16 hexadecimal digits."""
     digest = hashlib.sha256(repr(parameters).encode())
     for package in SOURCES:
         for path in sorted(Path(package.__path__[0]).rglob("*.py")):

@@ -13,7 +13,12 @@ Batch = Callable[[], float]  # makes some calls and returns the processor second
 
 
 def make_batch(work: Callable[[], object], seconds: float = BATCH_SECONDS) -> Batch:
-    """Return a batch of calls that takes about ``seconds``, compiled and warm."""
+    """Return a function that repeats a work for about ``seconds`` and returns processor seconds per call.
+
+    Args:
+        work: Function that works once; it is called twice, to compile it and to choose the number of calls.
+        seconds: Processor time of a batch [s].
+    """
     work()
     begin = time.process_time()
     work()
@@ -29,23 +34,51 @@ def make_batch(work: Callable[[], object], seconds: float = BATCH_SECONDS) -> Ba
 
 
 def measure_in_turns(batches: dict[str, Batch], rounds: int = ROUNDS) -> dict[str, np.ndarray]:
-    """Return the processor seconds of a call of each side, one value per round."""
+    """Run the batches of several sides in turns.
+
+    Args:
+        batches: Name of a side -> function that works and returns processor seconds per call.
+        rounds: Number of turns of each side.
+
+    Returns:
+        Name -> processor seconds per call in each round, shape (rounds,).
+    """
     rows = [[run() for run in batches.values()] for _ in range(rounds)]
     return dict(zip(batches, np.array(rows).T, strict=True))
 
 
 def rates(seconds: dict[str, np.ndarray], elements: dict[str, int]) -> dict[str, float]:
-    """Return the median element updates per second of each side."""
+    """Return the element updates per second of each side, the median over rounds.
+
+    Args:
+        seconds: Name -> processor seconds per call in each round, as ``measure_in_turns`` returns them.
+        elements: Name -> number of elements that a call updates.
+    """
     return {name: float(elements[name] / np.median(values)) for name, values in seconds.items()}
 
 
 def speed_ratio(seconds: dict[str, np.ndarray], ours: str, theirs: str) -> float:
-    """Return the speed of one side over another, the median over rounds."""
+    """Return the speed of one side over another, the median over rounds; above 1 if ``ours`` is faster.
+
+    Args:
+        seconds: Name -> processor seconds per call in each round, as ``measure_in_turns`` returns them.
+        ours: Name of the one side.
+        theirs: Name of the other side.
+    """
     return float(np.median(seconds[theirs] / seconds[ours]))
 
 
 def bar(value: float, limit: float, at_least: bool = True) -> dict[str, Any]:
-    """Return a figure with its limit and whether it is satisfied."""
+    """Compare a figure with its limit.
+
+    Args:
+        value: Measured figure.
+        limit: Limit of the figure.
+        at_least: Whether the limit is a lower one.
+
+    Returns:
+        ``value``, ``limit``, ``holds_if`` ("at least" or "at most"), and ``ok``, whether the limit is satisfied.
+    """
     return {
         "value": value,
         "limit": limit,

@@ -17,7 +17,14 @@ COMMANDS = {
 
 
 def read_run_figures(folder: Path = RUNS) -> tuple[dict[str, dict], dict[str, str]]:
-    """Return the figures of existing runs with their limits, and the commands of the missing runs."""
+    """Read the wall times of whole cases from their runs.
+
+    Args:
+        folder: Folder that contains the run folders.
+
+    Returns:
+        Name -> result of ``turns.bar`` for existing runs, and name -> command for missing ones.
+    """
     bars, missing = {}, {}
     for name, (case, limit, elements) in FIGURES.items():
         path = folder / case / "summary.json"

@@ -20,7 +20,8 @@ from numba import prange
 from benchmarks.tension.lists import Untracked, looped
 from reflowshock.arrays import Floats
 from reflowshock.particles.sph.fluid_state import Fields
-from reflowshock.particles.sph.particle_rates import compiled, solved
+from reflowshock.particles.sph.particle_pairs import compiled
+from reflowshock.particles.sph.particle_rates import solved
 from reflowshock.particles.sph.smoothing import SUPPORT, shape, slope
 
 # Threshold of the colour gradient over 1 / h; smaller gradients have no reliable direction (Morris 2000).
@@ -46,7 +47,16 @@ class ColourFunction(Untracked):
 
 @compiled
 def apart(fields, i, j, side):
-    """Return the distance vector of a pair without periodic images, which would cost a sixth more."""
+    """Return the vector (x, y, z) from particle j, or from its mirror image, to particle i, three scalars [m].
+
+    Periodic images are left out, since they would cost a sixth more.
+
+    Args:
+        fields: ``Fields``: arrays of the values of all particles.
+        i: Number of the first particle, integer.
+        j: Number of the second particle, integer.
+        side: 1 for particle j, -1 for its image behind the plane z = 0.
+    """
     return fields.x[i] - fields.x[j], fields.y[i] - fields.y[j], fields.z[i] - side * fields.z[j]
 
 

@@ -78,7 +78,17 @@ def _lacks(lists, fields, law, lack):
 
 @njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 def level_at(point, row, fields, support):
-    """Return the colour, its gradient (3) and its second derivatives (xx, yy, zz, xy, yz, xz) at a point."""
+    """Return the smoothed colour function (1 inside the liquid, 0 outside) and its derivatives at a point.
+
+    Args:
+        point: Position (x, y, z) [m].
+        row: Numbers of the particles near the point, shape (k,).
+        fields: ``Fields``: arrays of position, mass and density of all particles.
+        support: Radius of the kernel, scalar [m].
+
+    Returns:
+        Ten scalars: colour, gradient (x, y, z) [1/m], second derivatives xx, yy, zz, xy, yz, xz [1/m^2].
+    """
     x, y, z = point
     level = gx = gy = gz = xx = yy = zz = xy = yz = xz = 0.0
     for j in row:

@@ -20,20 +20,20 @@ FINE = 1.0 / 3.0
 
 
 def ray_directions(half: bool) -> Floats:
-    """Return directions, shape (400, 3), uniform over the sphere or its upper half, the first straight up."""
+    """Return unit vectors, shape (400, 3), uniform over the sphere or its upper half (``half``), the first upwards."""
     height = 1.0 - (np.arange(RAYS) / RAYS if half else 2.0 * np.arange(RAYS) / (RAYS - 1.0))
     turn, across = pi * (1.0 + sqrt(5.0)) * np.arange(RAYS), np.sqrt(np.maximum(1.0 - height**2, 0.0))
     return np.stack((across * np.cos(turn), across * np.sin(turn), height), axis=1)
 
 
 def level_points(points: Floats, volume: Floats, spacing: float, half: bool) -> Floats:
-    """Return points of the level, shape (400, 3), around the centre of the particles or, for a half, its foot.
+    """Return points of the level 1/2 of the colour along rays from the particles' centre, shape (400, 3) [m].
 
     Args:
         points: Particle positions [m], shape (n, 3).
         volume: Particle volumes [m^3], shape (n,).
         spacing: Spacing [m] of the tested particles, also for the lattice of an exact body.
-        half: Whether the particles stand on the mirror z = 0.
+        half: Whether the particles stand on the mirror z = 0; rays then start at the foot of the centre.
     """
     centre = volume @ points / volume.sum()
     if half:
@@ -44,7 +44,16 @@ def level_points(points: Floats, volume: Floats, spacing: float, half: bool) -> 
 
 
 def fill_lattice(inside, reach: float, spacing: float) -> tuple[Floats, Floats]:
-    """Return a fine lattice, shape (n, 3), in a body within ``reach`` [m] of the origin, and its volumes."""
+    """Fill a body with a fine lattice.
+
+    Args:
+        inside: Function of points, shape (k, 3) [m], that returns whether each is in the body.
+        reach: Largest distance of the body from the origin [m].
+        spacing: Spacing of the tested particles; the lattice is finer [m].
+
+    Returns:
+        Points in the body, shape (n, 3) [m], and their volumes, shape (n,) [m^3].
+    """
     fine = FINE * spacing
     places = fine * (np.arange(-int(reach / fine) - 1, int(reach / fine) + 1) + 0.5)
     points = np.stack(np.meshgrid(places, places, places, indexing="ij")).reshape(3, -1).T

@@ -35,13 +35,23 @@ NOTHING = 1e-200
 
 
 def strength(law: Law, tension: float) -> float:
-    """Return the strength s [N] for which a continuum of particles with a spacing has a tension [N/m]."""
+    """Return the strength s of the pairwise forces for which a continuum of particles has a surface tension [N].
+
+    Args:
+        law: Parameters of the pair interactions, of which the spacing is used.
+        tension: Surface tension [N/m].
+    """
     per_volume, length = law.spacing**-3, PAIRED * law.spacing / REACH
     return tension / (-(pi / 8.0) * per_volume**2 * length**5 * FOURTH)
 
 
 def cohesion(law: Law, tension: float) -> float:
-    """Return the (negative) pressure [Pa] of these forces inside the liquid."""
+    """Return the (negative) pressure of the pairwise forces inside the liquid [Pa].
+
+    Args:
+        law: Parameters of the pair interactions, of which the spacing is used.
+        tension: Surface tension of these forces [N/m].
+    """
     per_volume, length = law.spacing**-3, PAIRED * law.spacing / REACH
     return (2.0 * pi / 3.0) * per_volume**2 * strength(law, tension) * length**4 * THIRD
 

@@ -45,7 +45,13 @@ TOP = 10
 
 
 def set_up_drop(scene: Droplet, model: str, strength: float = 1.0) -> Simulation:
-    """Set up the drop of a scene with one of the models, at the pressure of a sphere."""
+    """Set up the drop of a scene with one of the models of surface tension, at the pressure of a sphere.
+
+    Args:
+        scene: Parameters of the droplet.
+        model: Model: tracked surface, "pairwise", "colour function" or "free-surface pressure".
+        strength: Strength of pairwise forces over theory; ignored by other models.
+    """
     tracked = droplet(scene)
     if model == TRACKED:
         return tracked
@@ -54,12 +60,20 @@ def set_up_drop(scene: Droplet, model: str, strength: float = 1.0) -> Simulation
 
 
 def fields_at(scene: Droplet, law: Law, points: Floats) -> Fields:
-    """Return particles at rest at points [m], shape (3, n), at the pressure of a sphere."""
+    """Return the fields of particles at rest at ``points``, shape (3, n) [m], at the pressure of a sphere."""
     return flow.make_fields(points, np.empty((3, 0)), np.full(points.shape[1], scene.laplace_pressure), law)
 
 
 def make_untracked(law: Law, fields: Fields, scene: Droplet, model: str, strength: float) -> Simulation:
-    """Return a simulation without a tracked surface."""
+    """Return a simulation of particles whose surface is not tracked by triangles.
+
+    Args:
+        law: Parameters of the pair interactions.
+        fields: Positions, velocities, densities and masses at the start.
+        scene: Surface tension and contact angle.
+        model: "pairwise", "colour function" or "free-surface pressure".
+        strength: Strength of pairwise forces over theory; ignored by other models.
+    """
     parameters = (law, scene.surface_tension, cos(scene.angle))
     if model == "pairwise":
         surface = Pairwise(*parameters, factor=strength)
@@ -71,12 +85,28 @@ def make_untracked(law: Law, fields: Fields, scene: Droplet, model: str, strengt
 
 
 def unit_drop(across: int, ohnesorge: float, **more) -> Droplet:
-    """Return a drop with unit density, tension and diameter."""
+    """Return a drop with unit density, tension and diameter.
+
+    Args:
+        across: Number of particles across the diameter.
+        ohnesorge: Ohnesorge number, equal to the viscosity.
+        more: Further parameters of the droplet.
+    """
     return Droplet(**UNIT | more, viscosity=ohnesorge, numerics=DropletNumerics(particles_per_diameter=across))
 
 
 def run_until(simulation: Simulation, until: float, sample: Callable[[Simulation], tuple[float, ...]]) -> dict:
-    """Run to a time; return the samples of every step, the cost, and when and why the liquid came apart."""
+    """Run a simulation, in place, to a time or until the liquid comes apart.
+
+    Args:
+        simulation: Simulation at its start.
+        until: Final time.
+        sample: Function of the simulation that returns a row after each step, the time first.
+
+    Returns:
+        ``particles``, ``steps``, ``seconds`` (processor time), number of ``lost`` particles, ``us_per_particle_step``,
+        ``rows`` as an array and, if the liquid came apart, ``torn_apart_at`` and ``why``.
+    """
     simulation.step(1e-9)  # compiles the kernels
     rows, seconds, looked, torn = [], 0.0, 0, {}
     try:
@@ -108,7 +138,7 @@ def count_detached(simulation: Simulation) -> int:
 
 
 def check_break_up(simulation: Simulation) -> dict:
-    """Return when and why the liquid came apart; empty if it did not."""
+    """Return ``torn_apart_at`` (time) and ``why`` if the liquid has come apart; empty if it has not."""
     fields = simulation.fields
     if not np.isfinite(np.array(fields[:3])).all():
         return {"torn_apart_at": simulation.time, "why": "positions are not finite"}
@@ -119,12 +149,17 @@ def check_break_up(simulation: Simulation) -> dict:
 
 
 def particle_volumes(fields: Fields) -> Floats:
-    """Return particle volumes [m^3]."""
+    """Return the volume of each particle, mass over density, shape (n,) [m^3]."""
     return fields.mass / fields.density
 
 
 def core_pressure(simulation: Simulation, radius: float) -> float:
-    """Return the mean pressure [Pa] within half a radius of the centre, including the model's own forces."""
+    """Return the mean pressure within half a radius of the drop's centre, including the model's own forces [Pa].
+
+    Args:
+        simulation: Drop at any time; not changed.
+        radius: Radius of the drop [m].
+    """
     points = np.stack(simulation.fields[:3], axis=1)
     model_pressure = getattr(simulation.surface, "bulk_pressure", lambda *_: 0.0)(points, simulation.fields)
     core = np.linalg.norm(points - points.mean(axis=0), axis=1) < 0.5 * radius
@@ -132,19 +167,30 @@ def core_pressure(simulation: Simulation, radius: float) -> float:
 
 
 def level_radii(simulation: Simulation) -> Floats:
-    """Return the distances [m] of the level from the centre."""
+    """Return the distances of a drop's surface, the level 1/2 of the colour, from its centre, shape (400,) [m]."""
     points, volume = np.stack(simulation.fields[:3], axis=1), particle_volumes(simulation.fields)
     level = level_points(points, volume, simulation.law.spacing, half=False)
     return np.linalg.norm(level - volume @ points / volume.sum(), axis=1)
 
 
 def last_tenth(rows: Floats) -> Floats:
-    """Return the last tenth of the samples, with time in the first column."""
+    """Return the rows of the last tenth of the time; the first column of ``rows``, shape (n, c), is the time."""
     return rows[rows[:, 0] >= 0.9 * rows[-1, 0]]
 
 
 def run_to_rest(model: str, across: int, strength: float, shape: str = "cube") -> dict:
-    """Let a cube become a sphere; return pressure, roundness and capillary number at rest."""
+    """Let a free drop come to rest as a sphere.
+
+    Args:
+        model: Model of surface tension.
+        across: Number of particles across the diameter.
+        strength: Strength of pairwise forces over theory.
+        shape: Initial shape, "cube" or "sphere".
+
+    Returns:
+        Figures of ``run_until`` without rows, and ``pressure_error``, ``pressure_drift``, ``roundness``,
+        ``capillary_number`` and ``volume_error`` unless the liquid came apart.
+    """
     scene = unit_drop(across, 0.2, start=shape)
 
     def sample(flow_state):
@@ -170,7 +216,18 @@ def run_to_rest(model: str, across: int, strength: float, shape: str = "cube") -
 
 
 def run_cap_to_rest(degrees: float, model: str, across: int, strength: float) -> dict:
-    """Let a half sphere become a cap; return the errors of height and base."""
+    """Let a half sphere on a wall come to rest as a spherical cap.
+
+    Args:
+        degrees: Contact angle [degrees].
+        model: Model of surface tension.
+        across: Number of particles across the diameter.
+        strength: Strength of pairwise forces over theory.
+
+    Returns:
+        Figures of ``run_until`` without rows, and ``height_error``, ``base_error``, ``capillary_number`` and
+        ``volume_error``; ``why`` for a model without a contact angle.
+    """
     if model == "free-surface pressure":
         return {"why": "the model has no contact angle; at a mirror the angle is 90 degrees"}
     scene = unit_drop(across, 0.2, contact_angle=radians(degrees))
@@ -200,7 +257,7 @@ def run_cap_to_rest(degrees: float, model: str, across: int, strength: float) ->
 
 
 def stretch_drop(simulation: Simulation) -> Simulation:
-    """Return the drop stretched along z, with its surface."""
+    """Return a new simulation of a drop stretched along z at constant volume; the given one must not be used again."""
     fields, factors = simulation.fields, np.array([STRETCH**-0.5, STRETCH**-0.5, STRETCH])
     for axis in range(3):
         fields[axis][:] *= factors[axis]
@@ -210,7 +267,17 @@ def stretch_drop(simulation: Simulation) -> Simulation:
 
 
 def run_swing(model: str, across: int, strength: float) -> dict:
-    """Let a stretched drop swing; return errors of period and decay of a damped cosine fitted to second moments."""
+    """Let a stretched drop swing and fit a damped cosine to its second moments.
+
+    Args:
+        model: Model of surface tension.
+        across: Number of particles across the diameter.
+        strength: Strength of pairwise forces over theory.
+
+    Returns:
+        Figures of ``run_until`` without rows, and ``period_error``, ``decay_error`` and ``fit_residual``; ``why``
+        without a fit.
+    """
     scene = unit_drop(across, 0.05)
     frequency = rayleigh_frequency(2, 0.5, 1.0, 1.0)
     decay, exact = viscous_oscillation(2, frequency, scene.viscosity / 0.25)
@@ -242,7 +309,15 @@ def run_swing(model: str, across: int, strength: float) -> dict:
 
 
 def make_pair(scene: Droplet, model: str, strength: float, gap: float = EDGE, speed: float = APPROACH) -> Simulation:
-    """Return two drops along x that approach each other at a speed [m/s], a gap [spacings] between them."""
+    """Return two drops along x that approach each other.
+
+    Args:
+        scene: Parameters of one drop.
+        model: Model of surface tension.
+        strength: Strength of pairwise forces over theory.
+        gap: Gap between the drops [spacings].
+        speed: Speed of each drop [m/s].
+    """
     drop = droplet(scene)
     aside = np.array([0.5 * scene.diameter + 0.5 * gap * drop.law.spacing, 0.0, 0.0])
     points, surface = np.array(drop.fields[:3]), drop.surface
@@ -261,7 +336,17 @@ def make_pair(scene: Droplet, model: str, strength: float, gap: float = EDGE, sp
 
 
 def run_merging(model: str, across: int, strength: float) -> dict:
-    """Let two drops merge; return radius, roundness and volume of the sphere, and the time until it is nearly round."""
+    """Let two drops merge to a sphere.
+
+    Args:
+        model: Model of surface tension.
+        across: Number of particles across the diameter of a drop.
+        strength: Strength of pairwise forces over theory.
+
+    Returns:
+        Figures of ``run_until`` without rows, and ``radius_error``, ``roundness``, ``pressure_error``,
+        ``volume_error``, ``capillary_number``, and ``round_after``, the time until it is nearly round.
+    """
     scene = unit_drop(across, 0.2)
     simulation = make_pair(scene, model, strength)
 

@@ -31,7 +31,7 @@ COARSE = 2.0  # thicknesses of the board
 
 
 def write_assembly(package: Package, board: Board, path: Path) -> dict[str, int]:
-    """Mesh board and package, both flat, and write them as MSH 4.1 in metres.
+    """Mesh board and package, both flat and without joints, and write them to one file, MSH 4.1 in metres.
 
     Args:
         package: Array, pads and layers of the package.

@@ -35,9 +35,9 @@ def plan_surfaces(plan: Plan, height: float, hole: RoundHole | None = None, reco
     """Add the blocks of a plan to the Gmsh model as transfinite surfaces.
 
     Args:
-        plan: Plan of board, package or box.
+        plan: Intervals along x and y that divide board, package or box into blocks, and the blocks with a hole.
         height: Coordinate z of the surfaces [m].
-        hole: Round hole in the blocks ``plan.holes``.
+        hole: Round hole in the blocks ``plan.holes``: its radius [m] and its number of cell rings; None without holes.
         recombine: Whether surfaces are meshed by quadrilaterals instead of triangles.
 
     Returns:
@@ -77,7 +77,8 @@ def extrude(surfaces: Surfaces, thickness: float, elements: int, recombine: bool
         recombine: Whether volumes are meshed by hexahedra instead of tetrahedra.
 
     Returns:
-        Block (i, j) -> volume tags, and block (i, j) -> tags of the upper surfaces, in the order of the given tags.
+        Block (i, j) -> tags of its volumes, and block (i, j) -> tags of the upper surfaces, each in the order of the
+        given tags.
     """
     volumes: Surfaces = {}
     tops: Surfaces = {}

@@ -112,6 +112,9 @@ def box_plan(box: Box) -> Plan:
 
     Args:
         box: Sizes, numbers of elements, symmetry and holes; only the meshed part (x, y >= 0 with symmetry) is divided.
+
+    Returns:
+        Intervals along x and y, and the blocks (i, j) that contain a hole.
     """
     x, y = _axis(box, 0), _axis(box, 1)
     return Plan(x, y, blocks_at(box.holes.places, x, y) if box.holes else frozenset())
@@ -119,6 +122,9 @@ def box_plan(box: Box) -> Plan:
 
 def count_box(box: Box) -> dict[str, PartEstimate]:
     """Count the elements of every layer exactly, and estimate the edge lengths of the smallest element.
+
+    Args:
+        box: Sizes, layers, numbers of elements, symmetry and holes.
 
     Returns:
         Layer name -> number of its elements, and edge lengths along x, y and z of the smallest box [m].
@@ -163,6 +169,9 @@ def _smallest_in_ring(box: Box, plan: Plan) -> float:
 
 def box_problems(box: Box) -> list[Problem]:
     """Return the input errors of a box before it is meshed; keys refer to the table ``structure`` of a case file.
+
+    Args:
+        box: Sizes, layers, numbers of elements, symmetry and holes.
 
     Returns:
         One ``Problem`` (dotted key, message, value, allowed values) for each error; empty for a box that can be meshed.

@@ -49,6 +49,9 @@ def hole_problems(package: Package, board: Board) -> Iterator[Problem]:
     Args:
         package: Package, whose substrate the holes must not touch.
         board: Sizes, mounting holes and symmetry of the board.
+
+    Yields:
+        Input errors with dotted keys of the case file, allowed ranges and hints.
     """
     return _hole_places(package, board) if _has_positions(board) else _holes(package, board)
 

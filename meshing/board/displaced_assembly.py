@@ -33,13 +33,13 @@ def write_displaced_assembly(source: Path, displacement: Displacement, path: Pat
     """Displace the nodes of the package in a flat assembly and write the result.
 
     Args:
-        source: The ``.msh`` file of the flat assembly.
+        source: The ``.msh`` file of the flat assembly, as ``write_assembly`` writes it; read only.
         displacement: Function of node positions of the package, shape (k, 3) [m], that returns their displacements
             relative to the board, shape (k, 3) [m].
         path: The ``.msh`` file to write.
 
     Returns:
-        Underside of the displaced package, as a height field above the board's top face.
+        Underside of the displaced package: height of its nodes above the board's top face, interpolated between them.
 
     Raises:
         ContactError: The package would touch the board.
@@ -76,6 +76,10 @@ def _check_room(underside: np.ndarray) -> None:
 
 def prescribed_displacement(package: Package, warpage: Warpage) -> Displacement:
     """Return the displacement field of a package with prescribed warpage.
+
+    Args:
+        package: Package, whose outermost joints define the warpage.
+        warpage: Prescribed warpage, a paraboloid given by its value at the corner joint [m].
 
     Returns:
         Function of undisplaced points of the package, shape (k, 3) [m], that returns their displacements relative to

@@ -49,7 +49,7 @@ class PartEstimate:
 def count_elements(
     package: Package, board: Board, warpage: Warpage = FLAT, fine: int | None = None
 ) -> dict[str, PartEstimate]:
-    """Count the hexahedra of every part; ``solder`` and ``copper`` are sums over the array.
+    """Count the hexahedra of every part of an assembly without meshing it; joints are summed over the array.
 
     Counts are exact if the solder wets its pads up to the edge of pad or mask; element lengths in joints follow from a
     cylinder with the smallest wetted radius and gap.

@@ -156,7 +156,9 @@ class PackageSide:
 
 
 def underside(package: Package) -> float:
-    """Return the height of the undisplaced underside, or of its copper plate, above the board's top face [m].
+    """Return the height of the undisplaced package's lowest face above the board's top face [m].
+
+    The face is the underside of the substrate, or of the copper plate below it.
 
     Args:
         package: Package with its standoff (gap between the pads) and the thickness and kind of its copper.

@@ -54,7 +54,7 @@ class PadSite:
 
 
 def row_name(row: int) -> str:
-    """Return the JEDEC letters of a row counted from 0: A ... Y, AA ... AY, BA ..."""
+    """Return the JEDEC letters of a row of joints, counted from 0: A ... Y, AA ... AY, BA ..."""
     count = len(ROW_LETTERS)
     prefix = "" if row < count else ROW_LETTERS[row // count - 1]
     return prefix + ROW_LETTERS[row % count]
@@ -66,7 +66,11 @@ def joint_name(row: int, column: int) -> str:
 
 
 def corner_axis(package: Package) -> tuple[float, float]:
-    """Return (x, y) of the outermost joint axis [m]."""
+    """Return the coordinates (x, y) of the axis of the joint at the array's corner, the largest ones [m].
+
+    Args:
+        package: Numbers of rows and columns, and pitch.
+    """
     return 0.5 * (package.columns - 1) * package.pitch, 0.5 * (package.rows - 1) * package.pitch
 
 
@@ -162,7 +166,12 @@ def lift(package: Package, warpage: Warpage, x: Length, y: Length) -> Length:
 
 
 def write_pads(path: Path, sites: Iterable[PadSite]) -> None:
-    """Write pad sites as a JSON list with one object of all fields for each site, in SI units."""
+    """Write pad sites as a JSON list with one object of all fields for each site, in SI units.
+
+    Args:
+        path: File to write; replaced if it exists.
+        sites: Positions and sizes of the two pads of each joint.
+    """
     path.write_text(json.dumps([asdict(site) for site in sites], indent=1) + "\n", encoding="utf-8")
 
 

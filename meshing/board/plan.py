@@ -64,6 +64,13 @@ def board_plan(package: Package, board: Board) -> Plan:
 
     Blocks (i, j) are formed by interval i along x and j along y. Grid lines follow the footprint of the package and the
     margin of the meso model's patch. With quarter symmetry only the positive halves of the axes are divided.
+
+    Args:
+        package: Sizes of substrate and die, which give the footprint, and element size.
+        board: Sizes, holes, symmetry, element sizes and margin.
+
+    Returns:
+        Intervals along x and y, and the blocks with a mounting hole.
     """
     numerics, square = board.numerics, hole_square(board)
     half = (0.5 * package.substrate.length, 0.5 * package.substrate.width)
@@ -104,6 +111,10 @@ def package_plan(package: Package, board: Board) -> Plan:
     """Divide the package into intervals along x and y, with the edges of the die on grid lines.
 
     With a quarter model of the board only the positive halves are returned. The plan has no holes.
+
+    Args:
+        package: Substrate, die and sizes of the elements.
+        board: Board, whose symmetry (full or quarter) is used.
     """
     x, y = package_axes(package)
     return Plan(x, y) if board.symmetry == "quarter" else Plan(_both_sides(x, x), _both_sides(y, y))
@@ -151,7 +162,7 @@ def square_around(diameter: float, inset: float) -> float:
 
 
 def uniform(start: float, end: float, size: float) -> Interval:
-    """Return an interval of an axis with equal cells.
+    """Return an interval of an axis that is divided into equal cells, for a plan of blocks.
 
     Args:
         start: Start of the interval [m].
@@ -162,21 +173,26 @@ def uniform(start: float, end: float, size: float) -> Interval:
 
 
 def hole_rings(board: Board) -> int:
-    """Return the number of cells, in radial direction, between a mounting hole and the edge of its square."""
+    """Return the number of cells, in radial direction, between a mounting hole and the edge of its square.
+
+    Args:
+        board: Diameter of the holes, their squares and the element size.
+    """
     ring = 0.5 * (hole_square(board) - board.holes.diameter)
     return max(1, round(ring / board.numerics.coarse_size))
 
 
 def column_levels(thickness: float, boxes: int, imprint: Imprint) -> np.ndarray:
-    """Return the depths of the interfaces between the layers of a column, from the pad's face, (layers + 1,) [m].
+    """Return the depths of the layers of the column below or above an imprinted pad, shape (layers + 1,) [m].
 
-    They include the planes between the boxes. A layer at depth z has the height h = first_layer + (growth - 1) z,
-    reduced so that a whole number of layers fits into each box.
+    The depths from the pad's face begin with 0 and end with the thickness; they include the planes between the boxes of
+    the surrounding mesh. A layer at depth z has the height h = first_layer + (growth - 1) z, reduced so that a whole
+    number of layers fits into each box.
 
     Args:
         thickness: Thickness of board or substrate [m].
         boxes: Number of boxes through that thickness.
-        imprint: Parameters of the column.
+        imprint: Parameters of the column: height of its first layer [m] and growth of the others.
     """
     slope = imprint.growth - 1.0
     depths = [0.0]
@@ -205,12 +221,25 @@ def blocks_within(plan: Plan, length: float, width: float) -> set[tuple[int, int
 
 
 def footprint(plan: Plan, package: Package) -> set[tuple[int, int]]:
-    """Return the blocks of the board's plan under the package: interval i along x, interval j along y."""
+    """Return the blocks of the board's plan under the package, as indices of intervals (i along x, j along y).
+
+    Args:
+        plan: Intervals of the board along x and y, as ``board_plan`` returns them.
+        package: Package, whose substrate covers the blocks.
+    """
     return blocks_within(plan, package.substrate.length, package.substrate.width)
 
 
 def patch(plan: Plan, package: Package) -> set[tuple[int, int]]:
-    """Return the blocks (i, j) of the board's plan under the package or in the margin around it."""
+    """Return the blocks of the board's plan under the package or in the margin around it, the patch of the meso model.
+
+    Args:
+        plan: Intervals of the board along x and y, as ``board_plan`` returns them.
+        package: Package, whose substrate covers the blocks.
+
+    Returns:
+        Indices (i along x, j along y) of the blocks.
+    """
     inside = footprint(plan, package)
     columns, rows = ({block[axis] for block in inside} for axis in (0, 1))
     return {(i, j) for i in _widened(columns) for j in _widened(rows)}

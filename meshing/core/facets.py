@@ -50,7 +50,7 @@ def outlines(facets: np.ndarray) -> list[np.ndarray]:
 
 
 def cut_segments(points: np.ndarray, triangles: np.ndarray, height: float) -> np.ndarray:
-    """Cut triangles with the plane z = height.
+    """Return the line segments in which the plane z = height cuts triangles.
 
     Args:
         points: Vertices, shape (n, 3) [m].
@@ -58,7 +58,7 @@ def cut_segments(points: np.ndarray, triangles: np.ndarray, height: float) -> np
         height: Height of the plane [m]; vertices exactly on the plane count as above it.
 
     Returns:
-        Segments of the section, shape (s, 2, 2) [m], with the body to their left, thus counter-clockwise.
+        Start and end (x, y) of each segment, shape (s, 2, 2) [m], with the body to its left, thus counter-clockwise.
     """
     above = points[:, 2] >= height
     count = above[triangles].sum(axis=1)
@@ -73,13 +73,21 @@ def cut_segments(points: np.ndarray, triangles: np.ndarray, height: float) -> np
 
 
 def section_area(segments: np.ndarray) -> float:
-    """Return the area enclosed by segments, start and end (x, y) of shape (s, 2, 2) [m], counter-clockwise [m^2]."""
+    """Return the area enclosed by the segments of a plane section [m^2].
+
+    Args:
+        segments: Start and end (x, y) of each segment, in any order, counter-clockwise, shape (s, 2, 2) [m].
+    """
     start, end = segments[:, 0], segments[:, 1]
     return 0.5 * float(np.sum(start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]))
 
 
 def section_centroid(segments: np.ndarray) -> np.ndarray:
-    """Return the centroid (x, y) of the area in counter-clockwise segments, start and end of shape (s, 2, 2) [m]."""
+    """Return the centroid (x, y) of the area enclosed by the segments of a plane section, shape (2,) [m].
+
+    Args:
+        segments: Start and end (x, y) of each segment, in any order, counter-clockwise, shape (s, 2, 2) [m].
+    """
     start, end = segments[:, 0], segments[:, 1]
     cross = start[:, 0] * end[:, 1] - end[:, 0] * start[:, 1]
     return ((start + end) * cross[:, None]).sum(axis=0) / (3.0 * cross.sum())
@@ -89,7 +97,7 @@ def radius_by_angle(segments: np.ndarray, centre: np.ndarray, angles: np.ndarray
     """Return the distance from a centre to the outline of a section along each angle.
 
     Args:
-        segments: Segments of the outline, shape (s, 2, 2) [m].
+        segments: Start and end (x, y) of each segment of the outline, shape (s, 2, 2) [m].
         centre: Start of the rays, shape (2,) [m].
         angles: Directions of the rays, shape (a,) [rad].
 

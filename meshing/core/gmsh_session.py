@@ -14,6 +14,9 @@ def gmsh_model(name: str) -> Iterator[None]:
     """Open a fresh, silent Gmsh session with one empty model for a ``with`` statement, at whose end Gmsh is closed.
 
     Sessions cannot be nested, since Gmsh has one session per process. The context yields None.
+
+    Args:
+        name: Name of the model in Gmsh.
     """
     gmsh.initialize(interruptible=False)
     try:

@@ -75,9 +75,12 @@ def quad_areas(points: np.ndarray, quads: np.ndarray) -> np.ndarray:
 
 
 def boundary_quads(cells: np.ndarray) -> np.ndarray:
-    """Return the faces that belong to one cell only, of hexahedra (c, 8), shape (f, 4).
+    """Return the faces that belong to one hexahedron only, as node numbers, shape (f, 4).
 
     Nodes run counter-clockwise seen from outside.
+
+    Args:
+        cells: Nodes of the hexahedra, shape (c, 8): lower face counter-clockwise, then upper face (VTK's order).
     """
     faces = cells[:, FACES].reshape(-1, 4)
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
@@ -105,13 +108,13 @@ class Freedom:
 def relax_hexahedra(points: np.ndarray, cells: np.ndarray, freedom: Freedom) -> np.ndarray:
     """Smooth a mesh so that corners with a small scaled Jacobian get a larger one.
 
-    Nodes descend along the gradient of the objective with a stride in proportion to their own edges; a step that does
-    not reduce the objective is rejected.
+    Nodes descend along the gradient of an objective that penalises small Jacobians, with a stride in proportion to
+    their own edges; a step that does not reduce the objective is rejected.
 
     Args:
         points: Node coordinates, shape (n, 3) [m].
         cells: Nodes of the hexahedra, shape (c, 8).
-        freedom: Constraints on the motion of the nodes.
+        freedom: Whether each node may move, and the direction in which it may not.
 
     Returns:
         Smoothed node coordinates, shape (n, 3) [m].

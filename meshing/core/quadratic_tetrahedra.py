@@ -41,7 +41,7 @@ def quadratic_tetrahedra(
     """Build ten-node tetrahedra whose surface edges are curved like the split hexahedra.
 
     Args:
-        split: Hexahedra into which the tetrahedra were split.
+        split: Hexahedra into which the tetrahedra were split, with lookups of the midpoints of edges and faces.
         points: Smoothed node coordinates of these hexahedra, shape (n, 3) [m]; give the midpoints of surface edges.
         tetrahedra: Vertices of the tetrahedra, shape (c, 4).
         faces: Facet set name -> vertices of surface triangles, shape (f, 3).

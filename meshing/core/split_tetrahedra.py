@@ -50,7 +50,8 @@ def split_tetrahedra(points: np.ndarray, tetrahedra: np.ndarray) -> SplitTetrahe
         tetrahedra: Vertices of the tetrahedra, shape (c, 4).
 
     Returns:
-        Nodes, the n vertices first, and hexahedra, with lookups of the midpoints of edges and faces.
+        Nodes, the n vertices first, then midpoints of edges, faces and cells; hexahedra, shape (4 c, 8); sorted keys by
+        which the midpoints of edges and faces are found.
     """
     count = len(points)
     edges, edge = np.unique(_keys(tetrahedra[:, EDGES], count), return_inverse=True)

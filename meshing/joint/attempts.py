@@ -59,8 +59,8 @@ def attempts(surface: ClosedSurface, numerics: JointNumerics, place: Placing) ->
     """Yield the meshing attempts for a body: swept if it is one piece between two pads, then free-form.
 
     Args:
-        surface: Closed surface of the body, in its own frame.
-        numerics: Resolution of the mesh.
+        surface: Closed surface of the solder (vertices, triangles, labels), in its own frame: board's pad at z = 0.
+        numerics: Resolution of the mesh: elements of the cross-section and layers.
         place: Function that maps points of the body's own frame to the assembly, shape (n, 3) [m] both.
 
     Yields:
@@ -76,7 +76,7 @@ def free_form(surface: ClosedSurface, numerics: JointNumerics, place: Placing) -
     """Yield the meshing attempts that suit a body of any shape, best first: split tetrahedra of several sizes.
 
     Args:
-        surface: Closed surface of the body, in its own frame.
+        surface: Closed surface of the solder (vertices, triangles, labels), in its own frame: board's pad at z = 0.
         numerics: Number of element layers, which gives the sizes.
         place: Function that maps points of the body's own frame to the assembly, shape (n, 3) [m] both.
 
@@ -110,7 +110,7 @@ def first_valid_mesh(
     """Return the first mesh that passes its checks; its record lists why earlier attempts failed.
 
     Args:
-        surface: Closed surface of the body.
+        surface: Closed surface of the solder, against which the mesh is checked.
         candidates: Meshing attempts in order of preference; no more of them are made than necessary.
         name: Name of the joint, for the message.
         build: Function that takes the meshed solder, moves it into the assembly and adds copper pads.
@@ -139,6 +139,10 @@ def first_valid_mesh(
 
 def shape_errors(surface: ClosedSurface, solder: Solder) -> dict[str, float]:
     """Compare the solder mesh with the surface that it fills, both in the body's own frame.
+
+    Args:
+        surface: Closed surface of the solder, with labels of its pads.
+        solder: Hexahedra with their wetted faces.
 
     Returns:
         ``standoff_error``, the relative error of the distance between the mean heights of the wetted faces;

@@ -65,10 +65,10 @@ def circumradius(sides: int) -> float:
 
 
 def section_edges(numerics: JointNumerics, radius: float) -> np.ndarray:
-    """Return two edge vectors of each quadrilateral of a round section, at its centre, shape (q, 2, 2) [m].
+    """Return two edge vectors (x, y) of each quadrilateral of a round section, at its centre, shape (q, 2, 2) [m].
 
     Args:
-        numerics: Resolution of the section.
+        numerics: Resolution of the section: elements of the core and rings around it.
         radius: Radius r of a disc with the area of the section, pi r^2 [m].
     """
     section = butterfly(numerics.core, numerics.rings)

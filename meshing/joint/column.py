@@ -83,7 +83,8 @@ def columns_of(site: PadSite, package: Package, board: Board, side: PackageSide)
         side: Displaced underside of the package.
 
     Returns:
-        Column under and column over the joint; an empty tuple if pads are not imprinted.
+        Geometry and resolution of the column under and of the column over the joint; an empty tuple if the package has
+        no imprint.
     """
     size, imprint = package.column_size, package.imprint
     if size is None or imprint is None:
@@ -111,16 +112,17 @@ def columns_of(site: PadSite, package: Package, board: Board, side: PackageSide)
 
 
 def column_pad(column: Column, outline: np.ndarray, opening: float, beyond: int) -> tuple[np.ndarray, Butterfly]:
-    """Mesh a pad of any outline with the butterfly section of its column.
+    """Mesh a pad of any outline with the butterfly section (core inside rings) of its column.
 
     Args:
-        column: Column that continues the pad.
+        column: Geometry and resolution of the column of board or substrate that continues the pad.
         outline: Outline of the copper's outer face, counter-clockwise seen from above, shape (r, 3) [m].
         opening: Ratio of the radii of mask opening and copper.
         beyond: Number of element rings between mask opening and edge of the copper.
 
     Returns:
-        Nodes of the pad in the assembly, shape (n, 3) [m], and the section with their connectivity.
+        Nodes of the pad in the assembly, shape (n, 3) [m], and the section, whose quadrilaterals and outline number
+        them.
 
     Raises:
         ValueError: The outline is not star-shaped about its centre.

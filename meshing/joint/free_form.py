@@ -39,7 +39,7 @@ def free_form_solder(surface: ClosedSurface, tetrahedra: Tetrahedra, place: Plac
 
     Args:
         surface: Closed surface in the body's own frame.
-        tetrahedra: Tetrahedra that fill it.
+        tetrahedra: Tetrahedra that fill it, with labels of its surface triangles.
         place: Map from the own frame to the assembly, where the volume is kept; points of shape (n, 3) [m].
 
     Returns:

@@ -155,10 +155,14 @@ def build_joint(solder: Solder, sites: Sequence[PadSite], copper: CopperPads | N
     """Move a body of solder into the assembly and add copper pads to its wetted faces.
 
     Args:
-        solder: Hexahedra in the body's own frame.
+        solder: Hexahedra in the body's own frame, with wetted faces.
         sites: Sites of the joints whose pads the solder wets; each face belongs to the nearest pad.
-        copper: Copper pads; None if solder sits on copper plates or replaces the copper.
+        copper: Thickness and resolution of the copper pads; None if solder sits on copper plates or replaces the
+            copper.
         place: Map from the own frame to the assembly.
+
+    Returns:
+        Hexahedra of solder, copper and columns by part name, and named facets, in the assembly.
 
     Raises:
         JointMeshError: A scaled Jacobian is too small.
@@ -212,7 +216,10 @@ def check_errors(mesh: JointMesh, errors: dict[str, float], largest_deviation: f
 
 
 def joint_quality(mesh: JointMesh) -> dict:
-    """Return the quality of a joint mesh.
+    """Return measures of the quality of a joint mesh, for the summary of a run.
+
+    Args:
+        mesh: Mesh of a joint, with the record of its meshing.
 
     Returns:
         ``volume_error``, ``section_scale`` and ``head_mismatch`` [m] (see ``JointMesh``); ``minimum_scaled_jacobian``;

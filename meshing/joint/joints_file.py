@@ -13,7 +13,7 @@ def write_joints(meshes: list[JointMesh], path: Path) -> dict[str, float]:
     """Write joint meshes to a Gmsh file in metres, each part as a discrete volume.
 
     Args:
-        meshes: Joint meshes in the assembly.
+        meshes: Joint meshes in the assembly: nodes, hexahedra by part name, and facets.
         path: The ``.msh`` file to write.
 
     Returns:

@@ -50,7 +50,7 @@ def mesh_joint(
     """Mesh a joint in its position in the assembly.
 
     Args:
-        surface: Closed surface in the joint's own frame.
+        surface: Closed surface of the solder in the joint's own frame: board's pad at z = 0, its centre on the axis.
         site: Positions and sizes of its pads.
         package: Package with copper and numerics.
         side: Underside of the package, which the head of the joint follows.
@@ -77,6 +77,9 @@ def mesh_bridge(surface: ClosedSurface, sites: Sequence[PadSite], package: Packa
         package: Package with copper and numerics.
         side: Underside of the package.
 
+    Returns:
+        Hexahedra of solder and copper by part name, with named facets and a record of the meshing.
+
     Raises:
         JointMeshError: The height of the surface differs from the gap, every meshing attempt fails its checks, or the
             body crosses a plane of symmetry.
@@ -102,10 +105,13 @@ def mesh_coarse_joint(surface: ClosedSurface, site: PadSite, package: Package, s
     """Mesh a joint with a few hexahedra of solder, which also replace the copper on its wetted discs.
 
     Args:
-        surface: Closed surface in the joint's own frame.
+        surface: Closed surface of the solder in the joint's own frame: board's pad at z = 0, its centre on the axis.
         site: Positions and sizes of its pads.
         package: Package with copper and the numerics of coarse joints.
         side: Underside of the package, which the head of the joint follows.
+
+    Returns:
+        Hexahedra of solder, in the assembly, with named facets and a record of the meshing.
 
     Raises:
         JointMeshError: The joint cannot be swept, a scaled Jacobian is too small, volume or shape differ too much from
@@ -130,7 +136,7 @@ def mesh_coarse_or_fine(
     is therefore meshed again without them.
 
     Args:
-        surface: Closed surface in the joint's own frame.
+        surface: Closed surface of the solder in the joint's own frame: board's pad at z = 0, its centre on the axis.
         fine: Fine mesh of the joint.
         site: Positions and sizes of its pads.
         package: Package with copper and numerics.

@@ -38,11 +38,11 @@ class Levels:
 
 
 def swept_solder(surface: ClosedSurface, numerics: JointNumerics, place: Placing, overhang: float = 0.0) -> Solder:
-    """Sweep hexahedra through a body from pad to pad.
+    """Fill a body of solder with layers of hexahedra from pad to pad.
 
     Args:
         surface: Closed surface in the body's own frame.
-        numerics: Resolution of the section, number and heights of the layers.
+        numerics: Resolution of the cross-section, number and heights of the layers.
         place: Map from the own frame to the assembly, where the volume is kept; points of shape (n, 3) [m].
         overhang: Height by which each end face is extruded as a part of the body [m].
 
@@ -79,10 +79,10 @@ def solder_levels(
 
     Args:
         surface: Closed surface in the body's own frame.
-        section: Butterfly mesh of the unit disc.
+        section: Quadrilaterals of the unit disc, a core inside rings.
         numerics: Number and heights of the layers.
-        place: Map from the own frame to the assembly, points of shape (n, 3) [m]. The volume is kept there, because
-            the gap under a curved package varies over the joint.
+        place: Map from the own frame to the assembly, points of shape (n, 3) [m]. The volume is kept there, because the
+            gap under a curved package varies over the joint.
         overhang: Height by which each end face is extruded as a part of the body [m].
 
     Returns:
@@ -164,8 +164,8 @@ def section_nodes(segments: np.ndarray, section: Butterfly) -> np.ndarray:
     """Stretch the unit disc radially to the outline of a section, keeping its area.
 
     Args:
-        segments: Oriented segments of the outline, shape (s, 2, 2) [m].
-        section: Mesh of the unit disc.
+        segments: Start and end (x, y) of each segment of the outline, counter-clockwise, shape (s, 2, 2) [m].
+        section: Quadrilaterals of the unit disc, whose n nodes are moved.
 
     Returns:
         Nodes of the section, shape (n, 2) [m].
@@ -181,14 +181,14 @@ def section_nodes(segments: np.ndarray, section: Butterfly) -> np.ndarray:
 
 
 def volume_keeping_scale(swept_volume: Callable[[float], float], volume: float) -> float:
-    """Find the scale of the inner outlines at which the mesh has the exact volume, by the secant method.
+    """Find the factor by which the outlines between the pads are scaled so that the mesh has the exact volume.
 
     Args:
         swept_volume: Function of the scale, 1 for the unscaled mesh, that returns the volume of the mesh [m^3].
         volume: Exact volume [m^3].
 
     Returns:
-        Scale, near 1.
+        Factor, near 1, found by the secant method.
 
     Raises:
         ValueError: The scale would differ from 1 by more than the allowed correction.

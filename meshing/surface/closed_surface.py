@@ -47,6 +47,9 @@ def close_surface(
         ring_board: Vertices along the contact line on the board, in order, shape (k,).
         ring_package: Vertices along the contact line on the package, in order, shape (l,).
 
+    Returns:
+        Vertices, triangles, and a label of each triangle: FREE, BOARD_PAD or PACKAGE_PAD.
+
     Raises:
         SurfaceError: The result is not watertight, not outward oriented, or has a degenerate triangle.
     """
@@ -59,7 +62,11 @@ def close_rings(points: np.ndarray, triangles: np.ndarray, rings: Sequence[np.nd
     Args:
         points: Vertices, shape (n, 3) [m]; vertices without a triangle are dropped.
         triangles: Triangles of the free surface, outward oriented, open along the rings, shape (t, 3).
-        rings: Vertices along each contact line, in order; contact lines in the lower half belong to the board.
+        rings: Vertices along each contact line, in order, shape (k,) each; contact lines in the lower half belong to
+            the board.
+
+    Returns:
+        Vertices, triangles, and a label of each triangle: FREE, BOARD_PAD or PACKAGE_PAD.
 
     Raises:
         SurfaceError: The result is not watertight, not outward oriented, or has a degenerate triangle.
@@ -117,7 +124,7 @@ def edge_numbers(edges: np.ndarray) -> np.ndarray:
 
 
 def enclosed_volume(surface: ClosedSurface) -> float:
-    """Return the volume enclosed by the surface [m^3]."""
+    """Return the volume that a closed surface of solder encloses [m^3]."""
     return volume_of(surface.points, surface.triangles)
 
 
@@ -133,7 +140,14 @@ def volume_of(points: np.ndarray, triangles: np.ndarray) -> float:
 
 
 def pad_planes(surface: ClosedSurface) -> PadPlanes:
-    """Fit the plane of the package's pad, or the common plane of its pads, in the surface's own frame."""
+    """Fit the plane of the package's pad, or the common plane of its pads, in the surface's own frame.
+
+    Args:
+        surface: Closed surface of a joint, whose board's pad lies at z = 0.
+
+    Returns:
+        Height of the plane above the board's pad [m], centre of the pad in plan [m], and slopes along x and y.
+    """
     return PadPlanes.fit(surface.points, surface.triangles[surface.boundary == PACKAGE_PAD])
 
 
@@ -143,6 +157,9 @@ def measure(surface: ClosedSurface) -> dict[str, float]:
     Width and angles belong to the body of revolution whose sections have the areas A(z) of the straightened joint; a
     polynomial is fitted to A(z). Areas are more accurate than distances, because vertices lie outside the smooth shape
     and chords inside it, while the integral of A is the volume.
+
+    Args:
+        surface: Closed surface of a joint with one pad on each side.
 
     Returns:
         ``volume`` [m^3], ``standoff`` [m], ``max_width`` [m], ``contact_radius_board`` and ``contact_radius_package``
@@ -169,7 +186,7 @@ def measure(surface: ClosedSurface) -> dict[str, float]:
 
 
 def pieces_of(surface: ClosedSurface, pad: int | None = None) -> list[np.ndarray]:
-    """Return the triangles (t, 3) of each connected piece of a surface, the piece with most triangles first.
+    """Return the triangles of each connected piece of a surface, shape (t, 3) each, the largest number first.
 
     Args:
         surface: Closed surface.
@@ -180,7 +197,12 @@ def pieces_of(surface: ClosedSurface, pad: int | None = None) -> list[np.ndarray
 
 
 def write_surface(path: Path, surface: ClosedSurface) -> None:
-    """Write a surface in metres with its boundary labels as ``.vtu``, or without labels as ``.stl``, by the suffix."""
+    """Write a surface in metres: with its boundary labels as ``.vtu``, or without them as ``.stl``, by the suffix.
+
+    Args:
+        path: File to write, replaced if it exists; its suffix selects the format.
+        surface: Vertices, triangles and labels.
+    """
     labels = {} if path.suffix == ".stl" else {"boundary": [surface.boundary]}
     meshio.write(path, meshio.Mesh(surface.points, [("triangle", surface.triangles)], cell_data=labels))
 
@@ -214,5 +236,10 @@ def area_vectors(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def pad_area(surface: ClosedSurface, pad: int) -> float:
-    """Return the wetted area [m^2] of all pads of one side; ``pad`` is its label, BOARD_PAD or PACKAGE_PAD."""
+    """Return the wetted area of all pads of one side [m^2].
+
+    Args:
+        surface: Closed surface of a joint, with labels of its triangles.
+        pad: Label of the side, BOARD_PAD or PACKAGE_PAD.
+    """
     return float(np.linalg.norm(area_vectors(surface.points, surface.triangles[surface.boundary == pad]), axis=1).sum())

@@ -14,9 +14,12 @@ def sphere_surface(sphere: TruncatedSphere, around: int = AROUND, levels: int = 
     """Triangulate a truncated sphere in the joint's own frame; the section at each level has the area of its circle.
 
     Args:
-        sphere: Truncated sphere.
+        sphere: Zone of a sphere between two parallel discs: height and radii of the discs [m].
         around: Number of vertices per section.
         levels: Number of sections at equal distances in height.
+
+    Returns:
+        Vertices, triangles and their labels, closed by a disc on each pad.
     """
     heights = np.linspace(0.0, sphere.height, levels)
     angles = 2.0 * math.pi * np.arange(around) / around

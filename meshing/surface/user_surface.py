@@ -58,7 +58,10 @@ def load_surface(path: Path, unit: Unit, site: PadSite) -> ClosedSurface:
     Args:
         path: STL, PLY or VTU file of triangles.
         unit: Unit of the coordinates in the file.
-        site: Site of the joint.
+        site: Positions, radii and gap of the two pads of the joint.
+
+    Returns:
+        Vertices, triangles and their labels, in the joint's own frame: board's pad at z = 0.
 
     Raises:
         SurfaceError: The file is damaged or its triangles do not enclose a joint; the message gives the file, the
@@ -212,7 +215,11 @@ def _between_pads(points: np.ndarray, triangles: np.ndarray, site: PadSite) -> C
 
 
 def site_slope(site: PadSite) -> np.ndarray:
-    """Return the slopes dz/dx and dz/dy of the package's pad at a site, shape (2,), from its tilt."""
+    """Return the slopes dz/dx and dz/dy of the package's pad of a joint, shape (2,).
+
+    Args:
+        site: Positions of the pads, with the rotations of the package's pad about x and y [rad].
+    """
     turn_x, turn_y = site.tilt
     angle = float(np.hypot(turn_x, turn_y))
     steep = np.tan(angle) / angle if angle else 1.0

@@ -126,7 +126,7 @@ def particle_volumes(cloud: Cloud, volume: float) -> Floats:
     planes of symmetry halve it, too.
 
     Args:
-        cloud: Particles of the body.
+        cloud: Particles of the body, with the numbers of surface particles, walls and contact lines.
         volume: Volume of the computed part of the body [m^3].
     """
     on_surface = np.arange(len(cloud.points)) < cloud.surface_count

@@ -89,8 +89,8 @@ def cell_of(point, origin, size, shape):
     Args:
         point: Coordinates, shape (3,) [m].
         origin: Lowest corner of the grid, shape (3,) [m].
-        size: Edge length of a cell [m].
-        shape: Number of cells along x, y and z, shape (3,).
+        size: Edge length of a cell, a scalar [m].
+        shape: Number of cells along x, y and z, integers, shape (3,).
     """
     x = min(max(int((point[0] - origin[0]) / size), 0), shape[0] - 1)
     y = min(max(int((point[1] - origin[1]) / size), 0), shape[1] - 1)
@@ -103,7 +103,7 @@ def extent(points):
     """Return the extent of points, shape (n, 3), and the number of points that are not finite.
 
     Args:
-        points: Coordinates, shape (n, 3).
+        points: Coordinates, shape (n, 3), in any unit, which the extent has, too.
 
     Returns:
         Lowest coordinates (x, y, z), highest coordinates (x, y, z), and number of points with an infinite coordinate or

@@ -64,7 +64,7 @@ def equal_area_radius(radius: Lengths, corners: Lengths) -> Lengths:
 
 
 def joint_cloud(geometry: JointGeometry, volume: float, spacing: float) -> Cloud:
-    """Fill a double cone of a given volume between two discs.
+    """Fill a double cone of a given volume between two discs with particles.
 
     The radius changes linearly from the board's disc to the middle and on to the package's disc. The shape meets both
     contact lines and has the right volume but is not in equilibrium. It is at most 60 degrees off the vertical, since
@@ -74,6 +74,9 @@ def joint_cloud(geometry: JointGeometry, volume: float, spacing: float) -> Cloud
         geometry: Gap and radii of the wetted discs.
         volume: Volume of the polyhedron enclosed by the surface and the walls [m^3].
         spacing: Particle spacing [m].
+
+    Returns:
+        Particles, with the triangles of the free surface and the contact lines on both plates (board's first).
 
     Raises:
         TooLittleSolder: The volume is too small for a double cone without rupture.
@@ -162,11 +165,14 @@ def _band_triangles(corners: int, layers: int) -> Indices:
 
 
 def box_cloud(edge: float, count: int) -> Cloud:
-    """Fill a cube that stands on the wall z = 0 with a lattice (Hu et al., section 4.1).
+    """Fill a cube that stands on the wall z = 0 with a lattice of particles (Hu et al., section 4.1).
 
     Args:
         edge: Length of an edge [m].
         count: Number of particles along an edge.
+
+    Returns:
+        Particles, with the triangles of the free surface and the contact line around the base.
     """
     axis = np.arange(count)
     lattice = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -186,11 +192,14 @@ def box_cloud(edge: float, count: int) -> Cloud:
 
 
 def free_box_cloud(edge: float, count: int) -> Cloud:
-    """Fill a cube about the origin with a lattice; it touches no wall.
+    """Fill a cube about the origin with a lattice of particles; it touches no wall.
 
     Args:
         edge: Length of an edge [m].
         count: Number of particles along an edge.
+
+    Returns:
+        Particles, with the triangles of the closed surface; without contact lines.
     """
     axis, last = np.arange(count), count - 1
     lattice = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -216,7 +225,7 @@ def _grid_triangles(sheet: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def sphere_cloud(volume: float, shells: int) -> Cloud:
-    """Fill a ball with geodesic spheres about a particle at the centre.
+    """Fill a ball about the origin with geodesic spheres of particles around one at the centre.
 
     Shell k has 10 k^2 + 2 particles, the k-fold subdivision of the faces of an icosahedron. With this symmetry the
     second mode has the same frequency about every axis.
@@ -224,6 +233,9 @@ def sphere_cloud(volume: float, shells: int) -> Cloud:
     Args:
         volume: Volume of the polyhedron of the surface [m^3].
         shells: Number of spheres, at least 2.
+
+    Returns:
+        Particles, with the triangles of the closed surface; without contact lines.
     """
     layers = [geodesic_sphere(k) * (k / shells) for k in range(shells, 0, -1)]
     points = np.concatenate([*layers, np.zeros((1, 3))])
@@ -242,7 +254,11 @@ def sphere_cloud(volume: float, shells: int) -> Cloud:
 
 
 def geodesic_sphere(frequency: int) -> Floats:
-    """Return the vertices of the subdivided icosahedron on the unit sphere, shape (10 frequency^2 + 2, 3)."""
+    """Return the vertices of a subdivided icosahedron on the unit sphere, shape (10 frequency^2 + 2, 3).
+
+    Args:
+        frequency: Number of parts into which each edge of the icosahedron is divided, at least 1.
+    """
     golden = 0.5 * (1.0 + np.sqrt(5.0))
     corner = np.array([[0.0, first, second * golden] for first in (1, -1) for second in (1, -1)])
     corners = np.concatenate([np.roll(corner, shift, axis=1) for shift in range(3)]) / np.hypot(1.0, golden)

@@ -34,11 +34,12 @@ def loop_over(function: Callable[[int, Any], None], **options: Any) -> Any:
     """Return a CUDA kernel ``(count, arguments)`` that calls ``function(i, arguments)`` for i from 0 to count - 1.
 
     Args:
-        function: CUDA device function of an index and a tuple of arguments.
+        function: CUDA device function of an item's number i and of a tuple of arguments; it writes its results into
+            arrays among these.
         options: Options of ``numba.cuda.jit``.
 
     Returns:
-        Kernel, run by ``launch``.
+        Kernel, to be run by ``launch``; it returns nothing.
     """
 
     @cuda.jit(**options)

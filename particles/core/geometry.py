@@ -37,7 +37,7 @@ def joint_counts(geometry: JointGeometry, volume: float, spacing: float) -> tupl
     Layers are sqrt(3)/2 spacings apart, so that the surface triangles are nearly equilateral.
 
     Args:
-        geometry: Gap and radii.
+        geometry: Gap between the plates and radii of the wetted discs.
         volume: Solder volume [m^3].
         spacing: Particle spacing [m].
     """

@@ -43,13 +43,14 @@ def _count_candidates(point, cells):
 
 @uncounted
 def write_near(point, limits, radius, cells, row):
-    """Write the numbers of the points near a point into a row and return how many there are.
+    """Write the numbers of the points near a point into a row and return their count, an integer.
 
     If there are more than the row has room for, the rest is counted but not written.
 
     Args:
         point: Coordinates (x, y, z) [m].
-        limits: Number of a point that is left out (-1 for none), and the number from which on all are left out.
+        limits: Tuple of two integers: number of a point that is left out (-1 for none); number from which on all points
+            are left out.
         radius: Search radius, a scalar [m].
         cells: ``CellList`` of the points, with cells at least as large as the radius.
         row: Output, integers, shape (room,); its last entry may be overwritten by a point that is too far away.
@@ -213,6 +214,9 @@ def have_moved(points: Sequence[Floats] | Floats, built_at: Sequence[Floats] | F
         points: Present coordinates as rows x, y, z, shape (3, n) [m].
         built_at: Coordinates for which the list was built, shape (3, n) [m].
         skin: Distance beyond the radius within which pairs are listed [m].
+
+    Returns:
+        True if the list must be rebuilt; False while it is complete.
     """
     x, y, z = map(np.ascontiguousarray, points)  # one kernel for all layouts
     before_x, before_y, before_z = map(np.ascontiguousarray, built_at)

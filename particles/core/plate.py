@@ -85,7 +85,11 @@ class Plate:
 
 
 def joint_plates(geometry: JointGeometry) -> tuple[Plate, Plate]:
-    """Return the board's plate at z = 0 and the package's plate with its offset and tilt."""
+    """Return the board's plate at z = 0 and the package's plate at its gap, with its offset and tilt, in this order.
+
+    Args:
+        geometry: Gap, offset and tilt of the package's disc; the radii are ignored.
+    """
     package = Plate.horizontal(geometry.gap, geometry.offset, side=1.0)
     return Plate.horizontal(0.0), package.moved(np.array([0.0, 0.0, 0.0, *geometry.tilt, 0.0]))
 
@@ -112,7 +116,7 @@ def slide(plates: Sequence[Plate], wall: NDArray[np.int8], field: Floats) -> Flo
     Args:
         plates: Plates, e.g. of a body, numbered from 0.
         wall: Number of the plate of each vector, -1 for none, shape (k,).
-        field: Vectors, shape (k, 3); not changed.
+        field: Vectors of any unit, shape (k, 3); not changed.
 
     Returns:
         Tangential vectors, shape (k, 3); vectors without a plate as they are.

@@ -152,7 +152,7 @@ def _area_vector(points: Floats, ring: Indices) -> Floats:
 
 
 def ring_area(points: Floats, ring: Indices) -> float:
-    """Return the area of the plane polygon of a contact line [m^2].
+    """Return the area of the plane polygon that a contact line encloses, in a plane of any orientation [m^2].
 
     Args:
         points: Positions, shape (n, 3) [m].
@@ -175,6 +175,8 @@ def ring_area_gradient(points: Floats, ring: Indices) -> Floats:
 
 def wall_corners(points: Floats, ring: Indices, plate: Plate) -> Floats:
     """Return the corners of outward triangles that close the body on a wall, shape (k, 3, 3) [m].
+
+    The axes of the result are triangle, corner and coordinate.
 
     The triangles form a fan around the mean of the contact line.
 
@@ -200,7 +202,7 @@ def volume_and_gradient(
     Args:
         points: Positions, shape (n, 3) [m].
         triangles: Outward triangles of the free surface, shape (t, 3).
-        rings: Vertices of each contact line.
+        rings: Vertices of each contact line in order, shape (k,) each; empty for a closed surface.
         plates: Wall of each contact line.
 
     Returns:
@@ -227,7 +229,7 @@ def centre_of_volume(points: Floats, triangles: Indices) -> Floats:
 
 @njit(cache=True)
 def surface_flux(points, triangles, velocity):
-    """Return the volume rate swept by each vertex of the surface, shape (k,) [m^3/s].
+    """Return the rate of the volume that each vertex of the surface sweeps, positive outwards, shape (k,) [m^3/s].
 
     It is a third of the area vectors of the vertex's triangles times its velocity; over a closed surface the sum is
     dV/dt.

@@ -23,6 +23,9 @@ def cut(cloud: Cloud, axes: Sequence[int]) -> Cloud:
     Args:
         cloud: Cloud with at most one contact line, with particles on the planes and no triangle across one.
         axes: 0 for the plane x = 0, 1 for y = 0, or both in this order; without axes the cloud is returned whole.
+
+    Returns:
+        Cloud of the part, which lists the axes as its planes of symmetry; contact lines become arcs.
     """
     if not axes:
         return cloud
@@ -52,7 +55,7 @@ def on_plane(cloud: Cloud, axis: int) -> NDArray[np.bool_]:
     """Return whether each particle of a cloud is on a plane of symmetry, shape (n,); it then stays there exactly.
 
     Args:
-        cloud: Cloud of the computed part.
+        cloud: Particles of the computed part of a body, cut off at the planes of symmetry that it lists.
         axis: 0 for the plane x = 0, 1 for y = 0.
     """
     return cloud.points[:, axis] == 0.0
@@ -61,8 +64,11 @@ def on_plane(cloud: Cloud, axis: int) -> NDArray[np.bool_]:
 def surface_planes(cloud: Cloud) -> list[tuple[int, NDArray[np.int32]]]:
     """Return the vertices of the free surface on each plane of symmetry.
 
+    Args:
+        cloud: Particles of the computed part of a body; an empty list is returned without planes of symmetry.
+
     Returns:
-        Axis of the plane (0 for x = 0, 1 for y = 0) and vertex numbers, shape (k,), for each plane.
+        For each plane: its axis (0 for x = 0, 1 for y = 0) and vertex numbers, shape (k,).
     """
     surface = {axis: on_plane(cloud, axis)[: cloud.surface_count] for axis in cloud.symmetry}
     return [(axis, np.flatnonzero(on).astype(np.int32)) for axis, on in surface.items()]
@@ -72,6 +78,9 @@ def share(cloud: Cloud) -> Floats:
     """Return the share of each particle in the computed part: 1/2 on a plane, 1/4 on both, else 1; shape (n,).
 
     The computed part is cut off at the planes of symmetry of the cloud; without planes all shares are 1.
+
+    Args:
+        cloud: Particles of the computed part.
     """
     result = np.ones(len(cloud.points))
     for axis in cloud.symmetry:
@@ -83,8 +92,8 @@ def fold(cloud: Cloud, field: Floats, first: int = 0) -> Floats:
     """Return vectors without their normal components at particles on planes of symmetry, shape (k, 3).
 
     Args:
-        cloud: Cloud of the computed part.
-        field: Vectors at consecutive particles, shape (k, 3); not changed.
+        cloud: Particles of the computed part of a body, cut off at the planes of symmetry that it lists.
+        field: Vectors of any unit at consecutive particles, shape (k, 3); not changed.
         first: Number of the particle of the first vector.
     """
     result = field.copy()
@@ -94,7 +103,7 @@ def fold(cloud: Cloud, field: Floats, first: int = 0) -> Floats:
 
 
 def unit(field: Floats) -> Floats:
-    """Return vectors (k, 3) normalised to unit length."""
+    """Return vectors, shape (k, 3), each divided by its length; the argument is not changed."""
     return field / np.linalg.norm(field, axis=1)[:, None]
 
 
@@ -102,7 +111,7 @@ def whole_points(cloud: Cloud, points: Floats, wall: int) -> tuple[Floats, Indic
     """Return the points of the contact line of a wall around the whole body, and the vertex of each.
 
     Args:
-        cloud: Cloud of the computed part.
+        cloud: Particles of the computed part of a body, cut off at the planes of symmetry that it lists.
         points: Positions of its particles, shape (n, 3) [m].
         wall: Index of the contact line.
 
@@ -118,7 +127,7 @@ def whole_line(cloud: Cloud, count: int) -> tuple[Indices, Floats]:
     """Return the closed contact line around the whole body as images of an arc with ``count`` vertices.
 
     Args:
-        cloud: Cloud of the computed part, with its planes of symmetry.
+        cloud: Particles of the computed part of a body, cut off at the planes of symmetry that it lists.
         count: Number of vertices of the arc; the line is the arc itself without planes of symmetry.
 
     Returns:

@@ -33,7 +33,11 @@ def tetrahedralise(points: Floats, spacing: float) -> Indices:
 
 
 def boundary_triangles(cells: Indices) -> Indices:
-    """Return the faces of tetrahedra (t, 4) that belong to one tetrahedron only, outward oriented, shape (f, 3)."""
+    """Return the faces that belong to one tetrahedron only, outward oriented, as vertex numbers, shape (f, 3).
+
+    Args:
+        cells: Vertex numbers of positively oriented tetrahedra, shape (t, 4).
+    """
     faces = cells[:, FACES].reshape(-1, 3)
     _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
     return faces[first[count == 1]]

@@ -11,7 +11,7 @@ PARTICLES_PER_THREAD = 4000
 
 @contextmanager
 def threads_for(particles: int) -> Iterator[None]:
-    """Limit the number of threads within a ``with`` block to one per ``PARTICLES_PER_THREAD`` particles.
+    """Limit Numba's threads within a ``with`` block to one per ``PARTICLES_PER_THREAD`` particles; yield None.
 
     Args:
         particles: Number of particles in the loops of the block; there is at least one thread.

@@ -62,14 +62,15 @@ def _nodes_across(points, corners, axis, origin, spacing):
 
 @njit(cache=True)
 def on_grid(points, triangles, origin, spacing, numbers):
-    """Add the winding numbers of a closed surface at the nodes of a grid to an array.
+    """Compute the winding numbers of a closed surface at the nodes of a grid and add them to an array.
 
     Args:
         points: Vertices, shape (n, 3) [m].
         triangles: Outward oriented triangles, shape (t, 3).
         origin: Position of the first node, shape (3,) [m].
         spacing: Distance between nodes, a scalar [m].
-        numbers: Integers, zero at first, shape (i, j, k) along x, y and z; 1 inside and 0 outside afterwards.
+        numbers: Output, integers, changed in place; zero at first, shape (i, j, k) along x, y and z; 1 inside and 0
+            outside afterwards.
     """
     last_x, last_y, last_z = numbers.shape[0] - 1, numbers.shape[1] - 1, numbers.shape[2] - 1
     for t in range(triangles.shape[0]):

@@ -100,11 +100,14 @@ class LinearTetrahedra:
 
 
 def particle_mass(cells: Indices, volumes: Floats, count: int) -> sparse.csr_matrix:
-    """Return the mass matrix over the density, definite with inverted tetrahedra, too, shape (n, n) [m^3].
+    """Return the consistent mass matrix of particles divided by the density, shape (n, n) [m^3].
+
+    It is positive definite even with inverted tetrahedra, which are left out; the others are scaled to the total
+    volume.
 
     Args:
         cells: Corners of the tetrahedra, shape (t, 4).
-        volumes: Their volumes, shape (t,) [m^3].
+        volumes: Signed volumes of the tetrahedra, shape (t,) [m^3]; negative if inverted.
         count: Number n of particles.
     """
     # Inverted tetrahedra correct the boundary of others. They are left out, so that the mass stays definite.
@@ -114,11 +117,13 @@ def particle_mass(cells: Indices, volumes: Floats, count: int) -> sparse.csr_mat
 
 
 def consistent_mass(cells: Indices, volumes: Floats, count: int) -> sparse.csr_matrix:
-    """Return integrals of products of linear shape functions, volume / 20 (1 + delta), shape (n, n) [m^3].
+    """Return the integrals of products of linear shape functions, the mass matrix over the density, shape (n, n) [m^3].
+
+    Each tetrahedron adds volume / 20 to the pairs of its corners, twice that on the diagonal.
 
     Args:
         cells: Corners of the tetrahedra, shape (t, 4).
-        volumes: Their volumes, shape (t,) [m^3].
+        volumes: Volumes of the tetrahedra, shape (t,) [m^3].
         count: Number n of particles.
     """
     rows, columns = np.repeat(cells, 4, axis=1).ravel(), np.tile(cells, (1, 4)).ravel()

@@ -15,7 +15,7 @@ from reflowshock.particles.core.tetrahedra import cell_volumes, thick_cells, vol
 
 
 def interpolation_matrix(points: Floats, cells: Indices, offset: Floats) -> sparse.csr_matrix:
-    """Return the interpolation at ``points + offset`` of fields linear in the tetrahedra; rows sum to one.
+    """Return the matrix that interpolates nodal values at ``points + offset``, linearly in tetrahedra; rows sum to one.
 
     Args:
         points: Corners of the tetrahedra, shape (n, 3) [m].

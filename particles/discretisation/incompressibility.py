@@ -71,7 +71,7 @@ def to_petsc(matrix: sparse.csr_matrix) -> PETSc.Mat:
 
 
 def to_petsc_spd(matrix: sparse.csr_matrix) -> PETSc.Mat:
-    """Copy a symmetric positive definite sparse matrix to PETSc."""
+    """Copy a symmetric positive definite sparse matrix to PETSc, on this process, and declare these properties."""
     result = to_petsc(matrix)
     result.setOption(PETSc.Mat.Option.SPD, True)
     return result
@@ -80,7 +80,7 @@ def to_petsc_spd(matrix: sparse.csr_matrix) -> PETSc.Mat:
 def factor_cholesky(matrix: sparse.csr_matrix) -> PETSc.KSP:
     """Factor a symmetric positive definite matrix by MUMPS and return a solver with its Cholesky factors.
 
-    The solver applies the factors only: ``solve(right, result)`` takes PETSc vectors.
+    The solver applies the factors only: ``solve(right, result)`` takes PETSc vectors and overwrites the second one.
     """
     solver = PETSc.KSP().create(PETSc.COMM_SELF)
     solver.setOperators(to_petsc_spd(matrix))
@@ -182,8 +182,8 @@ def check_residuals(problem: SaddlePoint, solution: Solution, reason: int, scale
     """Check the true residuals of a solution.
 
     Args:
-        problem: Saddle-point problem.
-        solution: Its approximate solution.
+        problem: Saddle-point problem A v - C^T p = f, C v + S p = g, with its matrices and right-hand sides.
+        solution: Its approximate solution: velocity, pressure and number of iterations.
         reason: Convergence reason of PETSc, positive if it converged.
         scale: Norm of the rates of volume that the pressure had to supply [m^3/s].
         leak: Stabilisation term S p, shape (m,) [m^3/s].

@@ -24,6 +24,9 @@ def fill_with_tetrahedra(body: Body) -> Indices:
     """Return tetrahedra between the particles of a body whose boundary is its surface, shape (t, 4).
 
     Their corners are particle numbers; faces on walls belong to the boundary, too.
+
+    Args:
+        body: Liquid body, with positions of its particles and triangles of its free surface.
     """
     cells = tetrahedralise(body.points, body.cloud.spacing)
     wall = body.cloud.wall

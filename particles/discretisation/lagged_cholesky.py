@@ -45,14 +45,14 @@ class Tolerance:
 def conjugate_gradients(
     operator: Apply, right: Floats, start: Floats, precondition: Apply, tolerance: Tolerance
 ) -> tuple[Floats, int]:
-    """Solve A x = b for a symmetric positive semidefinite A with b in its range.
+    """Solve A x = b by conjugate gradients, for a symmetric positive semidefinite A with b in its range.
 
     Args:
         operator: Function x -> A x.
         right: Right-hand side b, of any shape.
         start: Initial guess of x, shaped as b.
-        precondition: Function r -> P^-1 r.
-        tolerance: Tolerance of the residual.
+        precondition: Function r -> P^-1 r that applies the preconditioner to a residual.
+        tolerance: Relative and absolute limit of the residual norm, and largest number of iterations.
 
     Returns:
         Solution x and the number of iterations.

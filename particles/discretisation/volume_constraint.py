@@ -58,7 +58,7 @@ def solve_volume(problem: SaddlePoint) -> Solution:
     """Solve a problem whose only constraint is the volume; its Schur complement is a number.
 
     Args:
-        problem: Saddle-point problem with one constraint and without stabilisation.
+        problem: Saddle-point problem A v - C^T p = f, C v = g, whose C has one row.
 
     Returns:
         Velocity, the one pressure, and 0 iterations.

@@ -76,7 +76,7 @@ def plate_points(scene: Poiseuille, layers: int) -> Floats:
     """Return the positions of the wall particles of both plates, rows x, y, z of shape (3, m) [m].
 
     Args:
-        scene: Channel.
+        scene: Parameters of the channel flow: width, speed, duration, liquid and numerics.
         layers: Number of particle layers in each plate.
     """
     across, layer = scene.numerics.particles_across, np.arange(layers)
@@ -89,7 +89,7 @@ def exact_speeds(height: Floats, time: float, scene: Poiseuille) -> Floats:
     Args:
         height: Heights above the lower plate, shape (n,) [m].
         time: Time since the start [s]; ignored with a rheology, where the steady profile is returned.
-        scene: Channel.
+        scene: Parameters of the channel flow: width, speed, duration, liquid and numerics.
     """
     if scene.rheology is None:
         return exact.starting_channel(height, time, scene.width, scene.viscosity / scene.density, scene.force)

@@ -77,10 +77,12 @@ def column_points(scene: DamBreak) -> Floats:
 
 
 def tank_points(scene: DamBreak, layers: int) -> Floats:
-    """Return the wall particles of an open tank, four times as high as the column, shape (3, m) [m].
+    """Return the positions of the wall particles of an open tank, rows x, y, z of shape (3, m) [m].
+
+    The tank is four times as high as the column.
 
     Args:
-        scene: Dam break.
+        scene: Parameters of the dam break: column, tank, pressure sensor, liquid and numerics.
         layers: Number of particle layers in each wall.
     """
     spacing, length = scene.spacing, tank_columns(scene)
@@ -91,7 +93,11 @@ def tank_points(scene: DamBreak, layers: int) -> Floats:
 
 
 def tank_columns(scene: DamBreak) -> int:
-    """Return the length of the tank in spacings."""
+    """Return the length of the tank in particle spacings, rounded to an integer.
+
+    Args:
+        scene: Length of the tank and particle spacing.
+    """
     return round(scene.tank_length / scene.spacing)
 
 
@@ -99,7 +105,7 @@ def dam_metrics(scene: DamBreak, history: dict[str, Floats]) -> Metrics:
     """Compute the metrics of a dam break.
 
     Args:
-        scene: Dam break.
+        scene: Parameters of the dam break: column, tank, pressure sensor, liquid and numerics.
         history: Samples over time, shape (n,), in the columns ``time`` [s], ``sensor_pressure`` [Pa],
             ``kinetic_energy``, ``potential_energy`` and ``elastic_energy``.
 

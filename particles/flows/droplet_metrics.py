@@ -23,7 +23,7 @@ def impact_texts(scene: Droplet, history: Mapping[str, Floats]) -> dict[str, str
     """Describe an impact in words.
 
     Args:
-        scene: Droplet.
+        scene: Parameters of the droplet: liquid, size, wall, speed, effects and numerics.
         history: Samples over time; ``foot`` (wetted diameter [m]), ``parts`` (number) and ``shed`` (number of
             detachments so far) are used, each of shape (n,).
 
@@ -52,7 +52,7 @@ def drop_height(scene: Droplet, points: Floats) -> float:
     """Return the height of a drop above the wall, or the extent of a free drop along z [m].
 
     Args:
-        scene: Droplet.
+        scene: Parameters of the droplet: liquid, size, wall, speed, effects and numerics.
         points: Vertices of the surface, shape (m, 3) [m].
     """
     return float(points[:, 2].max() if scene.has_wall else np.ptp(points[:, 2]))
@@ -98,6 +98,9 @@ def rest_metrics(scene: Droplet) -> tuple[str, ...]:
 
     They are pressure and roundness of a free drop, base and height on a wall; empty for a drop with weight, an impact,
     or a bounded scene.
+
+    Args:
+        scene: Parameters of the droplet, of which wall, weight, speed and hysteresis decide.
     """
     if not scene.has_wall:
         return ("pressure_error", "roundness")
@@ -113,7 +116,7 @@ def droplet_metrics(scene: Droplet, history: dict[str, Floats]) -> Metrics:
     more parts detach.
 
     Args:
-        scene: Droplet.
+        scene: Parameters of the droplet: liquid, size, wall, speed, effects and numerics.
         history: Samples over time, shape (n,), in the columns of a droplet's run.
 
     Returns:

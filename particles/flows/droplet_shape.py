@@ -16,7 +16,7 @@ def start_shape(scene: Droplet, edge: float) -> tuple[Floats, tuple[Floats, Indi
     """Create the particles and the surface of a droplet.
 
     Args:
-        scene: Droplet.
+        scene: Parameters of the droplet: liquid, size, wall, speed, effects and numerics.
         edge: Edge length of the triangles in spacings.
 
     Returns:

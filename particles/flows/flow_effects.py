@@ -100,17 +100,25 @@ FLOW_EFFECTS = (FlowViscosity(), ArtificialViscosity(), ShearDependence())
 
 
 def sph_numerics(scene: FlowScene) -> MethodNumerics:
-    """Return the numerical parameters of a flow by delta-SPH; the scene must use this method, which is not checked."""
+    """Return ``scene.numerics`` with the type of delta-SPH; the scene must use this method, which is not checked."""
     return cast(MethodNumerics, scene.numerics)
 
 
 def sph_sound(scene: FlowScene) -> float:
-    """Return the speed of sound of a flow by delta-SPH [m/s]."""
+    """Return the artificial speed of sound of a flow computed by delta-SPH [m/s].
+
+    Args:
+        scene: Parameters of the flow, whose largest speed and numerics set it.
+    """
     return sph_numerics(scene).sound(scene.fastest)
 
 
 def artificial_viscosity(scene: FlowScene) -> float:
-    """Return the coefficient alpha of the artificial viscosity: set by the user, or the default."""
+    """Return the dimensionless coefficient alpha of the artificial viscosity: the user's value, or the default.
+
+    Args:
+        scene: Parameters of a flow that is computed by delta-SPH.
+    """
     user_alpha = sph_numerics(scene).artificial_viscosity
     if user_alpha is not None:
         return user_alpha
@@ -119,6 +127,9 @@ def artificial_viscosity(scene: FlowScene) -> float:
 
 def decide_flow(scene: FlowScene) -> dict[str, Decision]:
     """Decide on all effects of a flow, the common and the specific ones of its scene.
+
+    Args:
+        scene: Parameters of the flow: liquid, sizes, switches of effects and numerics.
 
     Returns:
         Effect name -> state ``on``, reason ``why`` and, if predicted, ``influence``; only effects of the scene's

@@ -10,8 +10,8 @@ def lattice(columns: NDArray[np.integer], rows: NDArray[np.integer], spacing: fl
     """Return the points of a square lattice in the plane y = 0, shape (3, n) [m].
 
     Args:
-        columns: Indices along x; index i gives x = (i + 1/2) spacing.
-        rows: Indices along z, which vary fastest.
+        columns: Indices along x, shape (c,); index i gives x = (i + 1/2) spacing.
+        rows: Indices along z, shape (r,), which vary fastest in the result.
         spacing: Distance between neighbouring points [m].
     """
     x, z = np.meshgrid(columns + 0.5, rows + 0.5, indexing="ij")

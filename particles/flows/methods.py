@@ -38,7 +38,11 @@ class HasMethod(Protocol):
 
 
 def computes(scene: HasMethod) -> bool:
-    """Return whether the numerical method that a scene selects has a solver for this kind of flow."""
+    """Return whether the numerical method that a scene selects has a solver for this kind of flow.
+
+    Args:
+        scene: Parameters of a flow; its class is the kind of flow, its numerics name the method.
+    """
     return type(scene).__name__ in SOLVERS[scene.numerics.method]
 
 
@@ -46,8 +50,8 @@ def solve_flow(scene: HasMethod, progress: Callable[[float], None], checkpoint: 
     """Compute a flow by the method of its scene.
 
     Args:
-        scene: Parameters of the flow.
-        progress: Function called with the completed fraction, 0 to 1.
+        scene: Parameters of the flow: liquid, sizes, effects and numerics.
+        progress: Function called after each step with the completed fraction, 0 to 1.
         checkpoint: Checkpoint to continue from, if its file exists, and to write.
 
     Returns:

@@ -55,7 +55,11 @@ def collocate(points: Floats, plates: Sequence[Plate], spacing: float, basis: st
         points: Particle positions, shape (n, 3) [m].
         plates: Walls, at which particles are mirrored; may be empty.
         spacing: Particle spacing [m].
-        basis: "linear" or "quadratic".
+        basis: Polynomial basis of the moving least squares fit, "linear" or "quadratic".
+
+    Returns:
+        Operators: sparse matrices, shape (n, n) for scalars and (3 n, 3 n) for velocities, that give values, gradient,
+        Laplacian, divergence [1/m, 1/m^2] and smoothed velocities from coefficients at the particles.
 
     Raises:
         DegenerateStencil: The derivatives at a particle cannot be fitted.

@@ -161,8 +161,8 @@ def force_pressure(body: Body, physics: Physics) -> Floats:
     carries the remaining force on a vertex that it pins.
 
     Args:
-        body: Liquid body.
-        physics: Effects that act on the body.
+        body: Liquid body: particles, triangles of its free surface, and plates.
+        physics: Effects that act on the body: forces, friction, contact lines and motions of plates.
     """
     count = body.cloud.surface_count
     force, slope = physics.force(body), body.volume()[1]
@@ -201,7 +201,7 @@ def viscous_pressure(body: Body, viscosity: float, gradient: Floats) -> Floats:
     vanishes, so that only numerical errors would damp the oscillation of a drop.
 
     Args:
-        body: Liquid body.
+        body: Liquid body: particles, triangles of its free surface, and plates.
         viscosity: Dynamic viscosity [Pa s].
         gradient: Velocity gradient dv_i / dx_j, shape (3, 3, n) [1/s].
     """

@@ -44,8 +44,12 @@ def fit_derivatives(points: Floats, rows: NDArray[np.int32], neighbours: Neighbo
     Args:
         points: Positions, shape (n, 3) [m].
         rows: Particles at which to fit, shape (m,).
-        neighbours: Neighbour list whose radius is the support of the weights.
-        basis: "linear" or "quadratic".
+        neighbours: Lists of the particles near each particle, within a radius that is the support of the weights.
+        basis: Polynomial basis of the moving least squares fit, "linear" or "quadratic".
+
+    Returns:
+        Sparse matrices of the derivatives by x, y, z [1/m] and of the Laplacian [1/m^2], shape (m, n) each, and the
+        order of the polynomials that each row reproduces, shape (m,).
 
     Raises:
         DegenerateStencil: A particle has too few neighbours, or they lie in a plane.
@@ -63,7 +67,7 @@ def fit_shape_functions(points: Floats, rows: NDArray[np.int32], neighbours: Nei
     Args:
         points: Positions, shape (n, 3) [m].
         rows: Particles at which to fit, shape (m,).
-        neighbours: Neighbour list whose radius is the support of the weights.
+        neighbours: Lists of the particles near each particle, within a radius that is the support of the weights.
 
     Returns:
         Sparse matrix, shape (m, n).
@@ -121,18 +125,18 @@ def _basis_and_weight(points, pair, support, basis):
 
 @njit(cache=True)
 def shape_weights(rows, points, offsets, indices, support):
-    """Return the shape functions psi_J = w_J p_J . M^-1 (1, 0, 0, 0) of pairs and of the particle itself.
+    """Return the linear MLS shape functions psi_J = w_J p_J . M^-1 (1, 0, 0, 0) at some particles.
 
     Args:
-        rows: Particles, shape (m,).
+        rows: Numbers of the particles at which the functions are fitted, integers, shape (m,).
         points: Positions, shape (n, 3) [m].
         offsets: Start of each particle's neighbours in ``indices``, shape (n + 1,).
-        indices: Neighbours, shape (k,).
+        indices: Numbers of the neighbours of all particles, integers.
         support: Support radius, scalar [m].
 
     Returns:
-        Weights of pairs, shape (k, 1), and of the particle itself, shape (m, 1); order of each row, 0 where M is
-        singular, shape (m,).
+        Tuple of three: weights of the neighbours of the m particles, one after the other, shape (k, 1); weights of the
+        particles themselves, shape (m, 1); order of each row, 1, or 0 where M is singular, shape (m,).
     """
     pair = np.zeros((indices.shape[0], 1))
     diagonal = np.zeros((rows.shape[0], 1))
@@ -165,19 +169,20 @@ def shape_weights(rows, points, offsets, indices, support):
 def linear_weights(rows, points, offsets, indices, support):
     """Return first derivatives and the Laplacian of the linear MLS shape functions at some particles.
 
-    psi_J = b . p_J w_J with M b = p; derivatives of b from M b,i = p,i - M,i b and
-    M b,ii = -2 M,i b,i - M,ii b (Belytschko et al. 1996). Offsets are in units of the support radius.
+    psi_J = b . p_J w_J with M b = p; derivatives of b from M b,i = p,i - M,i b and M b,ii = -2 M,i b,i - M,ii b
+    (Belytschko et al. 1996). Distances are in units of the support radius.
 
     Args:
-        rows: Particles, shape (m,).
+        rows: Numbers of the particles at which the functions are fitted, integers, shape (m,).
         points: Positions, shape (n, 3) [m].
         offsets: Start of each particle's neighbours in ``indices``, shape (n + 1,).
-        indices: Neighbours, shape (k,).
+        indices: Numbers of the neighbours of all particles, integers.
         support: Support radius, scalar [m].
 
     Returns:
-        Weights of pairs, shape (k, 4), and of the particle itself, shape (m, 4), in the columns d/dx, d/dy, d/dz and
-        Laplacian; order, 0 where M is singular, shape (m,).
+        Weights of the neighbours of the m particles, one after the other, shape (k, 4) [1/m, 1/m^2], and of the
+        particle itself, shape (m, 4), in the columns d/dx, d/dy, d/dz and Laplacian; order, 0 where M is singular,
+        shape (m,).
     """
     pair = np.zeros((indices.shape[0], 4))
     diagonal = np.zeros((rows.shape[0], 4))
@@ -321,15 +326,16 @@ def quadratic_weights(rows, points, offsets, indices, support):
     A row whose neighbours do not determine the quadratic terms falls back to a linear fit.
 
     Args:
-        rows: Particles, shape (m,).
+        rows: Numbers of the particles at which the expansion is fitted, integers, shape (m,).
         points: Positions, shape (n, 3) [m].
         offsets: Start of each particle's neighbours in ``indices``, shape (n + 1,).
-        indices: Neighbours, shape (k,).
+        indices: Numbers of the neighbours of all particles, integers.
         support: Support radius, scalar [m].
 
     Returns:
-        Weights of pairs, shape (k, 4), and their negative sums at the particle, shape (m, 4), in the columns d/dx,
-        d/dy, d/dz and Laplacian; order 2, 1 or 0 of each row, shape (m,).
+        Weights of the neighbours of the m particles, one after the other, shape (k, 4) [1/m, 1/m^2], and their negative
+        sums at the particle, shape (m, 4), in the columns d/dx, d/dy, d/dz and Laplacian; order 2, 1 or 0 of each row,
+        shape (m,).
     """
     pair = np.zeros((indices.shape[0], 4))
     diagonal = np.zeros((rows.shape[0], 4))

@@ -47,11 +47,11 @@ def predict_velocity(operators: Operators, material: Material, velocity: Floats,
     matrix N^T m on both sides cancels. The stress on the free surface enters by its pressure only.
 
     Args:
-        operators: Operators at the particles.
+        operators: Sparse matrices for values, derivatives and smoothing at the particles.
         material: Density over the time step [kg/(m^3 s)], and viscosity [Pa s].
         velocity: Unsmoothed velocity v before the step, all x, all y, all z, shape (3 n,) [m/s].
         slope: Gradient of the last pressure in the same order, shape (3 n,) [Pa/m].
-        basis: "linear" or "quadratic".
+        basis: Polynomial basis of the moving least squares fit, "linear" or "quadratic".
 
     Raises:
         SolveFailed: The linear solve failed.
@@ -155,6 +155,9 @@ def smooth_velocities(last: Velocities, coefficients: Floats, smoothing: sparse.
         last: Coefficients V and unsmoothed velocities u of the particles before the step, shape (3 n,) each [m/s].
         coefficients: New coefficients V_new, shape (3 n,) [m/s].
         smoothing: Smoothing operator S, shape (3 n, 3 n).
+
+    Returns:
+        Coefficients and unsmoothed velocities for the next step, shape (3 n,) each [m/s].
     """
     carried = last.unsmoothed + smoothing @ (coefficients - last.coefficients)
     return Velocities(coefficients, (1.0 - RELAXATION) * carried + RELAXATION * (smoothing @ coefficients))
@@ -163,7 +166,7 @@ def smooth_velocities(last: Velocities, coefficients: Floats, smoothing: sparse.
 def solve_gmres(matrix: sparse.csr_matrix, right: Floats, basis: str) -> tuple[Floats, int]:
     """Solve A x = b by GMRES with rows scaled by their largest entry.
 
-    The preconditioner is algebraic multigrid, or an LU factorisation for the linear basis.
+    The preconditioner is algebraic multigrid for the quadratic basis, and an LU factorisation for the linear one.
 
     Args:
         matrix: Matrix A, shape (d, d).

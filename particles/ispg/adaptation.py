@@ -108,15 +108,15 @@ class Adaptation:
 
 
 def restore_moments(body: Body, physics: Physics, volume: float, first: Floats) -> None:
-    """Move a surface to a given volume and first moment, as walls and edges admit.
+    """Move a surface so that it encloses a given volume with a given first moment, as walls and pad edges admit.
 
     Vertices move along their normals by amounts that are linear in space.
 
     Args:
-        body: Liquid body; moved in place.
-        physics: Effects that act on the body.
-        volume: Enclosed volume [m^3].
-        first: Integral of x over the body, shape (3,) [m^4].
+        body: Liquid body; its points are moved in place.
+        physics: Effects that act on the body; its contact lines and walls restrict the motion.
+        volume: Volume to enclose [m^3].
+        first: Integral of the position x over the body to reach, shape (3,) [m^4].
     """
     length = np.cbrt(volume)
     for _ in range(MOMENT_PASSES):

@@ -43,7 +43,11 @@ class EnergyLosses:
 
 
 def total_losses(losses: Sequence[EnergyLosses]) -> EnergyLosses:
-    """Return the sum of the energy losses [J] of several flows, cause by cause."""
+    """Return the sum of the energy losses of several flows, cause by cause.
+
+    Args:
+        losses: Energy lost by each flow since its start [J], by cause (viscous, smoothing, integration, ...).
+    """
     return EnergyLosses(*(sum(getattr(part, entry.name) for part in losses) for entry in fields(EnergyLosses)))
 
 

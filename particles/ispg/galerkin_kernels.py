@@ -1,220 +1,23 @@
-"""Kernels of the Galerkin space: linear MLS shape functions with their derivatives, and sums over their rows.
+"""Sums over the rows of shape functions: values, derivatives, forces and power; kernels of the Galerkin space.
 
-Columns are particles, followed by their ghosts. A row stores the weights (psi, psi,x psi,y psi,z) of each pair side by
-side, so that sums over a row, or over a column for transposes, visit each pair once. The order of summation does not
-depend on the number of threads.
+Columns are particles, followed by their ghosts. A row (``shape_function_rows.py``) stores the weights (psi, psi,x psi,y
+psi,z) of each pair side by side, so that sums over a row, or over a column for transposes, visit each pair once. The
+order of summation does not depend on the number of threads.
 """
 
 import numpy as np
-from numba import njit, prange
-
-from reflowshock.particles.ispg.stencils import factor_spd, substitute
-
-# Support radius in spacings; it is extended until the 16th neighbour lies within 1 / 1.2 of it.
-SUPPORT, FEWEST, WIDER = 2.0, 16, 1.2
-ROWS = 64  # rows that share work arrays
-
-
-@njit(cache=True, parallel=True)
-def supports(rows, points, lists, spacing):
-    """Return the squared support radius of some particles, and the number of points within it.
-
-    Args:
-        rows: Numbers of the particles, shape (m,).
-        points: Positions of n particles, then of g ghosts, shape (n + g, 3) [m].
-        lists: Offsets (n + 1,) and indices (k,) of the neighbours, and the radius of the search, a scalar [m].
-        spacing: Particle spacing, scalar [m]; the support is two spacings, or wider to hold 16 neighbours.
-
-    Returns:
-        Squared radii, zero where the search found too few points, shape (m,) [m^2], and numbers of points, shape (m,).
-    """
-    offsets, indices, reach = lists
-    squares, lengths = np.zeros(rows.shape[0]), np.ones(rows.shape[0], np.int64)
-    for r in prange(rows.shape[0]):
-        i, support = np.int64(rows[r]), (SUPPORT * spacing) ** 2
-        neighbours, limit = indices[offsets[i] : offsets[i + 1]], support / WIDER**2
-        near, within = 0, 0
-        for j in neighbours:
-            square = _square(points, i, j)
-            near += square < limit
-            within += square < support
-        if near < FEWEST and len(neighbours) >= FEWEST:
-            support = max(support, WIDER**2 * _square_of_the_fewest(points, i, neighbours))
-            within = _count_within(points, i, neighbours, support)
-        if max(near, len(neighbours)) >= FEWEST and support <= reach**2:
-            squares[r] = support
-            lengths[r] += within
-    return squares, lengths
-
-
-@njit(cache=True)
-def _square(points, i, j):
-    """Return the squared distance of two points."""
-    x, y, z = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1], points[j, 2] - points[i, 2]
-    return x * x + y * y + z * z
-
-
-@njit(cache=True)
-def _count_within(points, i, neighbours, limit):
-    """Return the number of neighbours of a point within a squared distance."""
-    count = 0
-    for j in neighbours:
-        count += _square(points, i, j) < limit
-    return count
-
-
-@njit(cache=True)
-def _square_of_the_fewest(points, i, neighbours):
-    """Return the squared distance of the 16th neighbour of a point."""
-    nearest = np.full(FEWEST, np.inf)  # ascending
-    for j in neighbours:
-        square, at = _square(points, i, j), FEWEST - 1
-        if square < nearest[at]:
-            while at > 0 and nearest[at - 1] > square:
-                nearest[at] = nearest[at - 1]
-                at -= 1
-            nearest[at] = square
-    return nearest[-1]
-
-
-@njit(cache=True)
-def with_rows(lists, rows, others):
-    """Return neighbour lists, offsets (n + 1,) and indices (k,), with some rows replaced.
-
-    ``lists`` are the old offsets and indices, ``rows`` (m,) the particles whose rows change, ``others`` the offsets
-    (m + 1,) and indices of their new rows. A particle itself is left out of its row.
-    """
-    (offsets, indices), (starts, replacements) = lists, others
-    number = np.full(offsets.shape[0] - 1, -1)
-    for r in range(rows.shape[0]):
-        number[rows[r]] = r
-    result, ends = np.empty(indices.shape[0] + replacements.shape[0], np.int32), np.zeros_like(offsets)
-    at = 0
-    for i in range(number.shape[0]):
-        n = number[i]
-        for j in indices[offsets[i] : offsets[i + 1]] if n < 0 else replacements[starts[n] : starts[n + 1]]:
-            if j != i:
-                result[at] = j
-                at += 1
-        ends[i + 1] = at
-    return ends, result[:at]
-
-
-@njit(cache=True, fastmath={"contract", "reassoc"})
-def _stencil(points, row, support, places):
-    """Write the offsets of a row's points over the support radius and 1 - their squares to ``places`` (4, m)."""
-    i, columns = row
-    x, y, z, scale = points[i, 0], points[i, 1], points[i, 2], 1.0 / support
-    for k in range(columns.shape[0]):
-        j = columns[k]
-        places[0, k], places[1, k], places[2, k] = points[j, 0] - x, points[j, 1] - y, points[j, 2] - z
-    for k in range(columns.shape[0]):
-        x, y, z = scale * places[0, k], scale * places[1, k], scale * places[2, k]
-        places[0, k], places[1, k], places[2, k], places[3, k] = x, y, z, 1.0 - (x * x + y * y + z * z)
-
-
-@njit(cache=True, fastmath={"contract", "reassoc"})
-def _moments(places, count, moments):
-    """Write the lower triangle of the moment matrix M = sum of w p p^T, p = (1, x, y, z), w = (1 - r^2)^3."""
-    m0 = mx = my = mz = xx = xy = xz = yy = yz = zz = 0.0
-    for k in range(count):
-        x, y, z, rest = places[0, k], places[1, k], places[2, k], places[3, k]
-        weight = rest * rest * rest
-        wx, wy, wz = weight * x, weight * y, weight * z
-        m0, mx, my, mz = m0 + weight, mx + wx, my + wy, mz + wz
-        xx, xy, xz, yy, yz, zz = xx + wx * x, xy + wx * y, xz + wx * z, yy + wy * y, yz + wy * z, zz + wz * z
-    moments[0, 0], moments[1, 0], moments[2, 0], moments[3, 0] = m0, mx, my, mz
-    moments[1, 1], moments[2, 1], moments[3, 1] = xx, xy, xz
-    moments[2, 2], moments[3, 2], moments[3, 3] = yy, yz, zz
-
-
-@njit(cache=True, fastmath={"contract", "reassoc"})
-def _slope_loads(places, count, first, loads):
-    """Write the right-hand sides e_c - M,c b to the columns of ``loads`` (4, 3); b is ``first``."""
-    sx = sy = sz = xx = xy = xz = yy = yz = zz = 0.0
-    b0, b1, b2, b3 = first[0, 0], first[1, 0], first[2, 0], first[3, 0]
-    for k in range(count):
-        x, y, z, rest = places[0, k], places[1, k], places[2, k], places[3, k]
-        slope = 6.0 * rest * rest * (b0 + b1 * x + b2 * y + b3 * z)
-        wx, wy, wz = slope * x, slope * y, slope * z
-        sx, sy, sz, xx, xy, xz = sx + wx, sy + wy, sz + wz, xx + wx * x, xy + wx * y, xz + wx * z
-        yy, yz, zz = yy + wy * y, yz + wy * z, zz + wz * z
-    loads[0, 0], loads[0, 1], loads[0, 2] = -sx, -sy, -sz
-    loads[1, 0], loads[1, 1], loads[1, 2] = 1.0 - xx, -xy, -xz
-    loads[2, 0], loads[2, 1], loads[2, 2] = -xy, 1.0 - yy, -yz
-    loads[3, 0], loads[3, 1], loads[3, 2] = -xz, -yz, 1.0 - zz
-
-
-@njit(cache=True, fastmath={"contract", "reassoc"})
-def _weights(places, count, solved, result):
-    """Write the weights of a row to ``result`` (m, 4) from b (4, 1) and its derivatives (4, 3); the support is one."""
-    first, slopes = solved
-    for k in range(count):
-        x, y, z, rest = places[0, k], places[1, k], places[2, k], places[3, k]
-        square = rest * rest
-        value = first[0, 0] + first[1, 0] * x + first[2, 0] * y + first[3, 0] * z
-        gradient, cube = 6.0 * value * square, square * rest
-        result[k, 0] = value * cube
-        result[k, 1] = (slopes[0, 0] + slopes[1, 0] * x + slopes[2, 0] * y + slopes[3, 0] * z) * cube + gradient * x
-        result[k, 2] = (slopes[0, 1] + slopes[1, 1] * x + slopes[2, 1] * y + slopes[3, 1] * z) * cube + gradient * y
-        result[k, 3] = (slopes[0, 2] + slopes[1, 2] * x + slopes[2, 2] * y + slopes[3, 2] * z) * cube + gradient * z
-
-
-@njit(cache=True, parallel=True)
-def shape_rows(points, lists, squares, starts, shares):
-    """Return the columns and weights of all rows, and the particle densities.
-
-    psi_J = w_J b . p_J with M b = (1, 0, 0, 0); psi_J,c = w_J b,c . p_J + w_J,c b . p_J with M b,c = e_c - M,c b.
-
-    Args:
-        points: Positions of n particles, then of g ghosts, shape (n + g, 3) [m].
-        lists: Offsets (n + 1,) and indices of the neighbours.
-        squares: Squared support radii, shape (n,) [m^2].
-        starts: Start of each row, shape (n + 1,).
-        shares: Share with which each point counts in the density, shape (n + g,).
-
-    Returns:
-        Columns, shape (k,); weights psi, psi,x, psi,y, psi,z, shape (k, 4) [1, 1/m]; densities up to a constant factor,
-        zero where M is singular, shape (n,) [1/m^3].
-    """
-    offsets, indices = lists
-    count, longest = squares.shape[0], np.diff(starts).max()
-    columns, weights = np.empty(starts[count], np.int32), np.empty((starts[count], 4))
-    density = np.zeros(count)
-    for part in prange((count + ROWS - 1) // ROWS):
-        places, moments, first, slopes = np.empty((4, longest)), np.empty((4, 4)), np.empty((4, 1)), np.empty((4, 3))
-        begin = ROWS * np.int64(part)  # a signed index, or numba compiles every callee twice
-        for i in range(begin, min(count, begin + ROWS)):
-            support, at = np.sqrt(squares[i]), starts[i]
-            columns[at] = i
-            for k in range(offsets[i], offsets[i + 1]):
-                if _square(points, i, indices[k]) < squares[i]:
-                    at += 1
-                    columns[at] = indices[k]
-            stencil, result = columns[starts[i] : at + 1], weights[starts[i] : at + 1]
-            _stencil(points, (i, stencil), support, places)
-            _moments(places, len(stencil), moments)
-            if not factor_spd(moments, 4):
-                continue
-            first[:], first[0] = 0.0, 1.0
-            substitute(moments, first, 4)
-            _slope_loads(places, len(stencil), first, slopes)
-            substitute(moments, slopes, 4)
-            _weights(places, len(stencil), (first, slopes), result)
-            total = 0.0
-            for k in range(len(stencil)):
-                total += shares[stencil[k]] * places[3, k] ** 3
-                for c in range(1, 4):
-                    result[k, c] /= support
-            density[i] = total / support**3
-    return columns, weights, density
+from numba import njit
 
 
 @njit(cache=True)
 def values(starts, columns, weights, field):
-    """Return N f at the particles, shape (n, d), of a field f on particles and ghosts, shape (n + g, d).
+    """Return the smoothed values N f of a field f at the particles, shape (n, d).
 
-    ``starts`` (n + 1,), ``columns`` (k,), ``weights`` (k, 4) are the rows of shape functions N and their derivatives.
+    Args:
+        starts: Start of each particle's row of shape functions N, shape (n + 1,).
+        columns: Particles and ghosts (mirror images, numbered from n) in the rows, shape (k,).
+        weights: Shape functions and their derivatives by x, y, z, shape (k, 4) [1, 1/m]; the first column is used.
+        field: Field with d components on the particles, then on the ghosts, shape (n + g, d).
     """
     result = np.zeros((starts.shape[0] - 1, field.shape[1]))
     for i in range(result.shape[0]):
@@ -226,9 +29,16 @@ def values(starts, columns, weights, field):
 
 @njit(cache=True)
 def spread(starts, columns, weights, parts, source):
-    """Distribute a scalar, ``parts`` (n,), to particles by shape functions, ghosts counting as their particles: (n,).
+    """Distribute a scalar of each particle to the particles in its row by shape functions: N^T parts, shape (n,).
 
-    ``source`` (g,) is the particle that each ghost mirrors; ``starts`` (n + 1,), ``columns`` (k,), ``weights`` (k, 4).
+    The share of a ghost (mirror image of a particle) goes to its particle, so that the sum is kept.
+
+    Args:
+        starts: Start of each particle's row of shape functions N, shape (n + 1,).
+        columns: Particles and ghosts (numbered from n) in the rows, shape (k,).
+        weights: Shape functions and their derivatives by x, y, z, shape (k, 4) [1, 1/m]; the first column is used.
+        parts: Scalar of each particle, e.g. its volume, shape (n,); not changed.
+        source: Particle that each ghost mirrors, shape (g,).
     """
     count = starts.shape[0] - 1
     result = np.zeros(count)
@@ -244,9 +54,12 @@ def lost_power(rows, fields, factors, walls):
     """Return the power in one velocity field of the forces that resist another one.
 
     Args:
-        rows: Starts (n + 1,), columns (k,) and weights (k, 4) of the shape functions N.
-        fields: Velocity that causes the forces and velocity in which they act, both with ghosts, (n + g, 3) [m/s].
-        factors: Coefficients of v - N v [kg/s], of N v [kg/s] and of twice the strain rate [N m s], shape (n, 3).
+        rows: Shape functions N, a tuple: start of each row, shape (n + 1,), particles and ghosts in the rows, shape
+            (k,), and values and derivatives by x, y, z, shape (k, 4) [1, 1/m].
+        fields: Velocity that causes the forces and velocity in which they act, a tuple; both on particles, then ghosts,
+            shape (n + g, 3) [m/s].
+        factors: Coefficients of each particle, shape (n, 3): of v - N v [kg/s] (smoothing), of N v [kg/s] (wall drag)
+            and of twice the strain rate [N m s] (viscosity times volume).
         walls: Wall velocities at the particles, shape (n, 3) [m/s].
 
     Returns:
@@ -273,7 +86,14 @@ def lost_power(rows, fields, factors, walls):
 
 @njit(cache=True)
 def velocity_gradient(starts, columns, weights, field):
-    """Return dv_c / dx_d (n, 3, 3) [1/s] of ``field`` (n + g, 3) [m/s]; starts (n + 1), columns (k), weights (k, 4)."""
+    """Return the velocity gradient at the particles, shape (n, 3, 3) [1/s]: entry (c, d) is dv_c / dx_d.
+
+    Args:
+        starts: Start of each particle's row of shape functions, shape (n + 1,).
+        columns: Particles and ghosts (mirror images, numbered from n) in the rows, shape (k,).
+        weights: Shape functions and their derivatives by x, y, z, shape (k, 4) [1, 1/m].
+        field: Velocity on particles, then on ghosts, shape (n + g, 3) [m/s].
+    """
     count = starts.shape[0] - 1
     gradient = np.empty((count, 3, 3))
     for i in range(count):
@@ -302,14 +122,15 @@ def resistance(starts, columns, weights, field, factors):
     """Return the forces of smoothing, wall drag and viscosity that resist a velocity field, in one pass over the rows.
 
     Args:
-        starts: Start of each row of the shape functions N, shape (n + 1,).
-        columns: Particles and ghosts in the rows, shape (k,).
+        starts: Start of each particle's row of shape functions N, shape (n + 1,).
+        columns: Particles and ghosts (mirror images, numbered from n) in the rows, shape (k,).
         weights: Shape functions and their derivatives by x, y, z, shape (k, 4) [1, 1/m].
-        field: Velocities v with ghosts, shape (n + g, 3) [m/s].
-        factors: Coefficients of v - N v [kg/s], of N v [kg/s] and of twice the strain rate [N m s], shape (n, 3).
+        field: Velocities v on particles, then on ghosts, shape (n + g, 3) [m/s].
+        factors: Coefficients of each particle, shape (n, 3): of v - N v [kg/s] (smoothing), of N v [kg/s] (wall drag)
+            and of twice the strain rate [N m s] (viscosity times volume).
 
     Returns:
-        Forces on particles and ghosts, shape (n + g, 3) [N].
+        Forces, positive along v (the liquid feels their negatives), on particles and ghosts, shape (n + g, 3) [N].
     """
     result = np.zeros(field.shape)
     for i in range(starts.shape[0] - 1):
@@ -341,7 +162,14 @@ def resistance(starts, columns, weights, field, factors):
 
 @njit(cache=True)
 def divergence(starts, columns, weights, field):
-    """Return the divergence (n,) [1/s] of velocities (n + g, 3) [m/s]; starts (n + 1), columns (k), weights (k, 4)."""
+    """Return the divergence of a velocity field at the particles, shape (n,) [1/s].
+
+    Args:
+        starts: Start of each particle's row of shape functions, shape (n + 1,).
+        columns: Particles and ghosts (mirror images, numbered from n) in the rows, shape (k,).
+        weights: Shape functions and their derivatives by x, y, z, shape (k, 4) [1, 1/m].
+        field: Velocity on particles, then on ghosts, shape (n + g, 3) [m/s].
+    """
     count = starts.shape[0] - 1
     result = np.empty(count)
     for i in range(count):
@@ -355,7 +183,15 @@ def divergence(starts, columns, weights, field):
 
 @njit(cache=True)
 def divergence_transposed(starts, columns, weights, factor, result):
-    """Add div^T ``factor`` (n,) [N m] to ``result`` (n + g, 3) [N]; starts (n + 1), columns (k), weights (k, 4)."""
+    """Add the transpose of ``divergence``, applied to a scalar of each particle, to forces.
+
+    Args:
+        starts: Start of each particle's row of shape functions, shape (n + 1,).
+        columns: Particles and ghosts (mirror images, numbered from n) in the rows, shape (k,).
+        weights: Shape functions and their derivatives by x, y, z, shape (k, 4) [1, 1/m].
+        factor: Scalar of each particle, pressure times volume, shape (n,) [N m].
+        result: Forces on particles, then on ghosts, shape (n + g, 3) [N]; changed in place.
+    """
     for i in range(starts.shape[0] - 1):
         f = factor[i]
         if f != 0.0:
@@ -368,9 +204,12 @@ def divergence_transposed(starts, columns, weights, factor, result):
 
 @njit(cache=True)
 def reflected(field, source, reflection):
-    """Append the reflected vectors of the ghosts to a vector field, shape (n, 3) to (n + g, 3).
+    """Return vectors of n particles, followed by their mirror images at g ghosts, shape (n + g, 3).
 
-    ``source`` (g,) is the particle that each ghost mirrors; ``reflection`` (g, 3, 3) maps its vector to the ghost.
+    Args:
+        field: Vectors of the particles, e.g. velocities, shape (n, 3); not changed.
+        source: Particle that each ghost mirrors, shape (g,).
+        reflection: Matrices that map the vector of the source to the ghost, shape (g, 3, 3).
     """
     count = field.shape[0]
     result = np.empty((count + source.shape[0], 3))
@@ -388,7 +227,17 @@ def reflected(field, source, reflection):
 
 @njit(cache=True)
 def folded(forces, source, reflection):
-    """Add ghost forces, turned by ``reflection`` (g, 3, 3), to particles ``source`` (g,): (n + g, 3) to (n, 3) [N]."""
+    """Return the forces on n particles, with the forces on their g ghosts added; the transpose of ``reflected``.
+
+    Args:
+        forces: Forces on particles, then on ghosts, shape (n + g, 3) [N]; not changed.
+        source: Particle that each ghost mirrors, shape (g,).
+        reflection: Matrices that map a vector of the source to the ghost, shape (g, 3, 3); their transposes are
+            applied.
+
+    Returns:
+        Forces, shape (n, 3) [N].
+    """
     count = forces.shape[0] - source.shape[0]
     result = forces[:count].copy()
     for g in range(source.shape[0]):

@@ -22,6 +22,7 @@ from reflowshock.particles.ispg import galerkin_kernels as kernels
 from reflowshock.particles.ispg.ghosts import Ghosts, mirror_particles
 from reflowshock.particles.ispg.moving_plates import FloatingModes
 from reflowshock.particles.ispg.nodal_volumes import body_moments, cell_share, fit_to_moments, nodal_volumes
+from reflowshock.particles.ispg.shape_function_rows import shape_rows, supports, with_rows
 from reflowshock.particles.ispg.stencils import check_stencils
 
 # Search radius for neighbours in spacings, and the larger one of particles with too few of them.
@@ -77,18 +78,18 @@ class GalerkinSpace:
         ghosts = mirror_particles(body.points, (*body.plates, *planes), WIDEST * spacing, slips)
         points = np.concatenate((body.points, ghosts.points))
         lists = find_neighbours(points, REACH * spacing, rows=count)
-        squares, lengths = kernels.supports(np.arange(count), points, (*lists, REACH * spacing), spacing)
+        squares, lengths = supports(np.arange(count), points, (*lists, REACH * spacing), spacing)
         sparse_rows = np.flatnonzero(squares == 0.0)
         if len(sparse_rows):
             near = find_near(points[sparse_rows], points, WIDEST * spacing)
-            lists = kernels.with_rows(lists, sparse_rows, near)
-            wider = kernels.supports(sparse_rows, points, (*lists, WIDEST * spacing), spacing)
+            lists = with_rows(lists, sparse_rows, near)
+            wider = supports(sparse_rows, points, (*lists, WIDEST * spacing), spacing)
             squares[sparse_rows], lengths[sparse_rows] = wider
         check_stencils(body, squares > 0.0, "has fewer than 16 neighbours within 4.4 spacings")
         starts = np.concatenate(([0], np.cumsum(lengths)))
         shares = cell_share(body)
         shares = np.concatenate((shares, shares[ghosts.source]))
-        columns, weights, density = kernels.shape_rows(points, lists, squares, starts, shares)
+        columns, weights, density = shape_rows(points, lists, squares, starts, shares)
         check_stencils(body, density > 0.0, "has all its neighbours in a plane")
         moments = body_moments(body)
         volumes = nodal_volumes(body, density, moments)
@@ -199,5 +200,13 @@ class GalerkinSpace:
 
 
 def symmetry_planes(cloud: Cloud) -> list[Plate]:
-    """Return the planes of symmetry of a cloud as plates, to be mirrored like walls."""
+    """Return the planes of symmetry of a cloud as plates, so that particles can be mirrored at them as at walls.
+
+    Args:
+        cloud: Particles of the computed part of a body; its ``symmetry`` lists the axes, 0 for the plane x = 0 and 1
+            for y = 0.
+
+    Returns:
+        One plate for each plane, in the order of the axes; empty without symmetry.
+    """
     return [Plate(np.zeros(3), np.roll(np.eye(3), 2 - axis, axis=0)) for axis in cloud.symmetry]

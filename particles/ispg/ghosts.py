@@ -82,7 +82,7 @@ class Ghosts:
 def mirror_particles(
     points: Floats, plates: Sequence[Plate], reach: float, slip_lengths: Sequence[float] | None = None
 ) -> Ghosts:
-    """Mirror the particles near each plate, plate by plate.
+    """Create ghost particles: the mirror images of the particles near each plate, plate by plate.
 
     Ghosts of earlier plates are mirrored, too, so that an edge between two plates at right angles has images of both.
     The tangential velocity of a ghost is (b - z) / (b + z) times that velocity of its particle, with the slip length b

@@ -70,13 +70,14 @@ class MovingBody:
 
 
 def transfer_motion(new: Sequence[MovingBody], old: Sequence[MovingBody]) -> None:
-    """Give remeshed bodies and their solvers the motion and the energy losses of the bodies they replace.
+    """Give remeshed bodies and their solvers the velocity, momentum and energy losses of the bodies that they replace.
 
     All losses are attributed to the first new body: only their sum over the bodies is meaningful.
 
     Args:
-        new: Remeshed bodies before their first step; velocities and solver states are set in place.
-        old: Bodies that they replace.
+        new: Remeshed bodies (body, physics and step solver) before their first step; velocities and solver states are
+            set in place.
+        old: Bodies that they replace, in their last state; not changed.
     """
     states, twists = [part.state for part in old], [_plate_twists(part.body, old) for part in new]
     equations = [part.equations(of_plates) for part, of_plates in zip(new, twists, strict=True)]
@@ -133,7 +134,8 @@ def interpolate_velocity(points: Floats, states: Sequence[GalerkinState], spacin
 
     Args:
         points: New points, shape (n, 3) [m].
-        states: States of the old bodies.
+        states: States of the old bodies, with positions, shape (k, 3) [m], velocities and velocity gradients of their
+            particles.
         spacing: Particle spacing, which bounds the inverse-distance weights [m].
 
     Returns:

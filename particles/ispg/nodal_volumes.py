@@ -37,6 +37,12 @@ def body_moments(body: Body) -> Moments:
     """Return the integrals over the liquid of 1 [m^3], x, shape (3,) [m^4], and x x, shape (3, 3) [m^5].
 
     They are sums over tetrahedra between the triangles of the boundary and the origin.
+
+    Args:
+        body: Liquid body, whose free surface and walls are the boundary.
+
+    Returns:
+        Tuple of the three integrals, in this order.
     """
     if (exact := body.moments()) is not None:
         return exact
@@ -75,20 +81,24 @@ def _add_moments(points, triangles, result):
 
 
 def cell_share(body: Body) -> Floats:
-    """Return the share of a full cell of each particle, walls ignored: 1/2 on the surface, 1 inside, shape (n,)."""
+    """Return the share of a full cell of each particle, shape (n,): 1/2 on the free surface, 1 inside and on walls.
+
+    Args:
+        body: Liquid body, of which the numbers of particles and of surface particles are used.
+    """
     on_surface = np.arange(len(body.points)) < body.cloud.surface_count
     return np.where(on_surface, 0.5, 1.0)
 
 
 def wall_shares(body: Body, volumes: Floats) -> Floats:
-    """Return the wetted wall area of each particle, distributed by volume, zero off the walls.
+    """Divide the wetted area of each wall among the particles on it, in proportion to their volumes.
 
     Args:
-        body: Liquid body.
+        body: Liquid body: particles, triangles of its free surface, and plates.
         volumes: Nodal volumes, shape (n,) [m^3].
 
     Returns:
-        Areas, shape (n,) [m^2].
+        Wall area of each particle, shape (n,) [m^2]; zero off the walls.
     """
     areas = np.zeros(len(body.points))
     for wall, ring in enumerate(body.cloud.rings):
@@ -102,7 +112,7 @@ def nodal_volumes(body: Body, density: Floats, moments: Moments) -> Floats:
     """Return the nodal volumes, the weights of integration, shape (n,) [m^3].
 
     Args:
-        body: Liquid body.
+        body: Liquid body: particles, triangles of its free surface, and plates.
         density: Number of particles per volume at each particle, with walls mirrored and the free surface counted by
             ``cell_share``, shape (n,) [1/m^3].
         moments: Integrals over the body of 1 [m^3], x, shape (3,) [m^4], and x x, shape (3, 3) [m^5].
@@ -116,10 +126,12 @@ def nodal_volumes(body: Body, density: Floats, moments: Moments) -> Floats:
 
 
 def fit_to_moments(body: Body, cells: Floats, moments: Moments) -> Floats:
-    """Return the volumes closest to given cells that have the moments of the body, shape (n,) [m^3].
+    """Return the positive volumes closest to given cells that have the moments of the body, shape (n,) [m^3].
+
+    Their sum and first moments are exact, second moments approximate.
 
     Args:
-        body: Liquid body.
+        body: Liquid body: particles, triangles of its free surface, and plates.
         cells: Relative cell volumes, in any unit, shape (n,).
         moments: Integrals over the body of 1 [m^3], x, shape (3,) [m^4], and x x, shape (3, 3) [m^5].
 
@@ -151,13 +163,14 @@ def _powers(points, centre, length):
 
 
 def fit_volumes(cells: Floats, powers: Floats, moments: Floats, softness: Floats) -> Floats:
-    """Return volumes v exp(q) with given moments, q a polynomial; see the module.
+    """Return positive volumes with given moments: cells v times exp(q), where q is a polynomial in the position.
 
     Args:
         cells: Volumes v, whose sum is the volume of the body, shape (n,) [m^3].
         powers: Dimensionless monomials at the particles, the first of which is 1, shape (n, k).
         moments: Required sums of volumes times monomials, shape (k,) [m^3].
-        softness: Softness of each moment, 0 if exact, shape (k,) [m^3].
+        softness: Error that each moment may keep in exchange for volumes nearer to the cells; 0 for an exact moment,
+            shape (k,) [m^3].
 
     Returns:
         Volumes, shape (n,) [m^3].

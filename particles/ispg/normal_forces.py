@@ -25,7 +25,11 @@ FAST = 0.1
 
 
 def has_friction(physics: Physics) -> bool:
-    """Return whether walls resist liquid that slides on them (Navier slip or no slip)."""
+    """Return whether walls resist liquid that slides on them (Navier slip or no slip).
+
+    Args:
+        physics: Effects that act on a body, of which the frictions and constraints at plates are examined.
+    """
     return bool(physics.frictions or physics.holds)
 
 
@@ -45,11 +49,12 @@ def tangential_share(gradient: Floats, frequency: float) -> float:
 def normal_surface_force(body: Body, physics: Physics, masses: Floats, share: float = 0.0) -> Floats:
     """Return the forces of the surface and its walls with a reduced tangential part, shape (n, 3) [N].
 
-    Net force and moment are unchanged along the rigid-body motions that frictionless walls would admit.
+    The surface tension of a discrete surface has a spurious tangential part. Net force and moment are unchanged along
+    the rigid-body motions that frictionless walls would admit.
 
     Args:
-        body: Liquid body.
-        physics: Effects that act on the body.
+        body: Liquid body: particles, triangles of its free surface, and plates.
+        physics: Effects that act on the body: forces, friction, contact lines and motions of plates.
         masses: Particle masses, shape (n,) [kg].
         share: Share of the tangential part that acts, 0 to 1.
     """

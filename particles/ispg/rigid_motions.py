@@ -18,7 +18,7 @@ TURN = 5  # index of the rotation about the z axis
 
 
 def admitted_motions(points: Floats, projections: Floats) -> NDArray[np.bool_]:
-    """Return which rigid-body motions the walls admit, shape (6,): three translations, then three rotations.
+    """Return whether walls admit each rigid-body motion, translations along x, y, z, then rotations, shape (6,).
 
     Args:
         points: Particle positions, shape (n, 3) [m].
@@ -30,14 +30,16 @@ def admitted_motions(points: Floats, projections: Floats) -> NDArray[np.bool_]:
 
 
 def edges_are_coaxial(body: Body, physics: Physics) -> bool:
-    """Return whether all pad edges are circles about the z axis, so that they exert no moment about it.
+    """Return whether walls admit rotation about the z axis and all pad edges are circles about it.
+
+    Such edges exert no moment about the axis.
 
     A vertex pinned at an edge does not slide along it either. The spurious angular momentum that this gives the body
     must vanish when the edges release it.
 
     Args:
-        body: Liquid body.
-        physics: Effects that act on the body.
+        body: Liquid body: particles, triangles of its free surface, and plates.
+        physics: Effects that act on the body: forces, friction, contact lines and motions of plates.
     """
     unpinned = admitted_motions(body.points, replace(physics, lines=()).projections(body))[TURN]
     return bool(unpinned and all(_about_axis(line.pads, body.plates[line.wall]) for line in physics.lines))
@@ -51,13 +53,13 @@ def _about_axis(pads: Sequence[Pad], plate: Plate) -> bool:
 
 
 def rigid_motions(points: Floats) -> Floats:
-    """Return unit translations along and unit rotations about the axes through the origin.
+    """Return the velocity fields of unit translations along x, y, z and of unit rotations about these axes.
 
     Args:
         points: Particle positions, shape (n, 3) [m].
 
     Returns:
-        Velocity fields of three translations, then three rotations, shape (6, n, 3).
+        Velocities of the particles, three translations first [1], then three rotations [m], shape (6, n, 3).
     """
     motions = np.zeros((6, *points.shape))
     for axis in range(3):
@@ -70,7 +72,7 @@ def wall_velocities(body: Body, twists: Mapping[int, Floats]) -> Floats:
     """Return the velocity of the plates at the particles on them, zero elsewhere.
 
     Args:
-        body: Liquid body.
+        body: Liquid body: particles, triangles of its free surface, and plates.
         twists: Twist of each moving plate by its index, shape (6,) [m/s, rad/s].
 
     Returns:
@@ -97,7 +99,7 @@ def rigid_momenta(motions: Floats, masses: Floats, velocity: Floats) -> Floats:
     """Return the momenta of a velocity field along rigid-body motions.
 
     Args:
-        motions: Rigid-body motions, shape (k, n, 3).
+        motions: Velocity fields of k rigid-body motions, shape (k, n, 3).
         masses: Particle masses, shape (n,) [kg].
         velocity: Velocity, shape (n, 3) [m/s].
 
@@ -108,10 +110,12 @@ def rigid_momenta(motions: Floats, masses: Floats, velocity: Floats) -> Floats:
 
 
 def orthonormalise(motions: Floats, masses: Floats) -> Floats:
-    """Return a mass-orthonormal basis of rigid-body motions, shape (k, n, 3) [1/sqrt(kg)].
+    """Return a basis of rigid-body motions that is orthonormal by mass, shape (k, n, 3) [1/sqrt(kg)].
+
+    The product of two fields is the sum of m u . v over the particles.
 
     Args:
-        motions: Rigid-body motions, shape (k, n, 3).
+        motions: Velocity fields of k independent rigid-body motions, shape (k, n, 3).
         masses: Particle masses, shape (n,) [kg].
     """
     flat = motions.reshape(len(motions), 3 * len(masses))
@@ -120,7 +124,7 @@ def orthonormalise(motions: Floats, masses: Floats) -> Floats:
 
 
 def rigid_part(basis: Floats, masses: Floats, velocity: Floats) -> Floats:
-    """Return the rigid-body part of a velocity field, shape (n, 3) [m/s].
+    """Return the rigid-body part of a velocity field, its mass-weighted projection onto a basis, shape (n, 3) [m/s].
 
     Args:
         basis: Mass-orthonormal rigid-body motions, shape (k, n, 3) [1/sqrt(kg)].

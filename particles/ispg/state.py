@@ -208,13 +208,13 @@ class Prediction:
 
 
 def find_centre(body: Body) -> Floats:
-    """Return the centre of volume of the liquid, shape (3,) [m]."""
+    """Return the centre of the volume of a liquid body, shape (3,) [m]."""
     volume, first, _ = body_moments(body)
     return first / volume
 
 
 def smoothing_passes(gradient: Floats, frequency: float, time_step: float) -> float:
-    """Return the number of mesh smoothing passes due after a step, at most one.
+    """Return the number of mesh smoothing passes due after a step, a fraction of one pass or one.
 
     Distorted triangles have slightly more energy. A whole pass after every step, however short, would take that energy
     from an oscillation each time it distorts them: 5 % in two periods with 309 particles.
@@ -222,7 +222,7 @@ def smoothing_passes(gradient: Floats, frequency: float, time_step: float) -> fl
     Args:
         gradient: Velocity gradient, shape (n, 3, 3) [1/s].
         frequency: Frequency of the grid's capillary waves [1/s].
-        time_step: Time step [s].
+        time_step: Time step [s]; the number grows with the strain in it.
     """
     strain = 0.5 * time_step * (gradient + gradient.transpose(0, 2, 1))
     by_strain = PASSES_PER_STRAIN * float(np.sqrt((strain**2).sum(axis=(1, 2)).mean()))

@@ -14,10 +14,10 @@ class DegenerateStencil(ArithmeticError):
 
 
 def check_stencils(body: Body, sound: NDArray[np.bool_], trouble: str) -> None:
-    """Raise an error if the stencil of a particle is degenerate.
+    """Raise an error if the stencil (the neighbours from which gradients are fitted) of a particle is degenerate.
 
     Args:
-        body: Liquid body.
+        body: Liquid body: particles, triangles of its free surface, and plates.
         sound: Whether the stencil of each particle is sound, shape (n,).
         trouble: Predicate of the message, e.g. "has fewer than 16 neighbours".
 
@@ -35,7 +35,8 @@ def factor_spd(matrix, size):
     """Factor a symmetric positive definite matrix in place by Cholesky's method.
 
     Args:
-        matrix: Matrix, shape (>= size, >= size); the lower triangle of its leading block is replaced by the factor L.
+        matrix: Matrix, a real array of shape (>= size, >= size), changed in place; the lower triangle of its leading
+            block is replaced by the factor L.
         size: Number of rows and columns in use, integer.
 
     Returns:
@@ -58,7 +59,7 @@ def factor_spd(matrix, size):
 
 @njit(cache=True)
 def substitute(factor, right, size):
-    """Solve in place for all columns of the right-hand side with a Cholesky factor.
+    """Solve A X = B with a Cholesky factor of A, for all columns of B; the solutions replace B.
 
     Args:
         factor: Array with the factor L of A = L L^T in the lower triangle of its leading block, shape (>= size, >=

@@ -20,14 +20,14 @@ from reflowshock.particles.ispg.galerkin_kernels import (
 
 @njit(cache=True)
 def projected(frames, field):
-    """Multiply the vector of each particle by its matrix.
+    """Multiply the vector of each particle by the matrix of that particle.
 
     Args:
-        frames: Matrices, shape (n, 3, 3).
-        field: Vectors, shape (n, 3).
+        frames: Matrices, e.g. projections onto velocities that walls admit, shape (n, 3, 3).
+        field: Vectors, shape (n, 3); not changed.
 
     Returns:
-        Products, shape (n, 3).
+        Products, in the unit of the vectors, shape (n, 3).
     """
     result = np.empty_like(field)
     for i in range(field.shape[0]):
@@ -42,13 +42,13 @@ def projected_blocks(starts, columns, blocks, frames):
     """Multiply the blocks of a sparse matrix by symmetric matrices of their row and column: F_i A_ij F_j.
 
     Args:
-        starts: Start of each block row, shape (n + 1,).
+        starts: Start of each block row in ``columns`` and ``blocks``, shape (n + 1,).
         columns: Block column of each block, shape (k,).
-        blocks: Blocks A_ij, shape (k, 3, 3); not changed.
+        blocks: Blocks A_ij, e.g. of a stiffness matrix [N/m], shape (k, 3, 3); not changed.
         frames: Symmetric matrix F_i of each particle, shape (n, 3, 3).
 
     Returns:
-        Blocks in the same order, shape (k, 3, 3).
+        Blocks in the same order and unit, shape (k, 3, 3).
     """
     result, half = np.empty_like(blocks), np.empty((3, 3))
     for i in range(starts.shape[0] - 1):
@@ -69,11 +69,13 @@ def rates_of_volume(rows, images, parts, field):
     """Return B v, the rates at which a velocity field v changes the nodal volumes, shape (n,) [m^3/s].
 
     Args:
-        rows: Shape functions: starts (n + 1,), columns (k,) and weights (k, 4), the values and derivatives by x, y, z.
-        images: Ghosts: particle that each mirrors (g,) and reflection of its vectors (g, 3, 3).
-        parts: Nodal volumes, shape (n,) [m^3]; gradient of the enclosed volume minus the gradient of the sum of nodal
-            volumes, shape (n, 3) [m^2].
-        field: Velocity, shape (n, 3) [m/s].
+        rows: Shape functions, a tuple: start of each particle's row, shape (n + 1,), particles and ghosts in the rows,
+            shape (k,), and values and derivatives by x, y, z, shape (k, 4) [1, 1/m].
+        images: Ghosts, mirror images at walls, a tuple: particle that each mirrors, shape (g,), and matrix that maps
+            its vectors to the ghost, shape (g, 3, 3).
+        parts: Tuple of two: nodal volumes, shape (n,) [m^3]; gradient of the enclosed volume minus the gradient of the
+            sum of nodal volumes, shape (n, 3) [m^2].
+        field: Velocity v of the particles, shape (n, 3) [m/s].
     """
     volumes, unbalanced = parts
     missed, total = 0.0, 0.0
@@ -86,13 +88,17 @@ def rates_of_volume(rows, images, parts, field):
 
 @njit(cache=True)
 def pressure_forces(rows, images, parts, pressure):
-    """Return B^T p, the transpose of ``rates_of_volume`` applied to pressures, shape (n, 3) [N].
+    """Return the forces B^T p of pressures p on the particles, shape (n, 3) [N]; B is the matrix of volume rates.
+
+    B times a velocity field is the result of ``rates_of_volume``.
 
     Args:
-        rows: Shape functions: starts (n + 1,), columns (k,) and weights (k, 4), the values and derivatives by x, y, z.
-        images: Ghosts: particle that each mirrors (g,) and reflection of its vectors (g, 3, 3).
-        parts: Nodal volumes, shape (n,) [m^3]; gradient of the enclosed volume minus the gradient of the sum of nodal
-            volumes, shape (n, 3) [m^2].
+        rows: Shape functions, a tuple: start of each particle's row, shape (n + 1,), particles and ghosts in the rows,
+            shape (k,), and values and derivatives by x, y, z, shape (k, 4) [1, 1/m].
+        images: Ghosts, mirror images at walls, a tuple: particle that each mirrors, shape (g,), and matrix that maps
+            its vectors to the ghost, shape (g, 3, 3).
+        parts: Tuple of two: nodal volumes, shape (n,) [m^3]; gradient of the enclosed volume minus the gradient of the
+            sum of nodal volumes, shape (n, 3) [m^2].
         pressure: Pressures at the particles, shape (n,) [Pa].
     """
     volumes, unbalanced = parts
@@ -105,14 +111,17 @@ def pressure_forces(rows, images, parts, pressure):
 def friction_operator(rows, images, resisted, field):
     """Apply m/dt + V + S to a velocity field and project the force onto admissible directions, shape (n, 3) [N].
 
-    V are the viscous and wall forces, S the smoothing of the velocity.
+    m are the particle masses and dt is the time step; V are the viscous and wall forces, S the smoothing of the
+    velocity. No argument is changed.
 
     Args:
-        rows: Shape functions: starts (n + 1,), columns (k,) and weights (k, 4), the values and derivatives by x, y, z.
-        images: Ghosts: particle that each mirrors (g,) and reflection of its vectors (g, 3, 3).
-        resisted: Masses over the time step, shape (n,) [kg/s]; coefficients of v - N v [kg/s] (smoothing), of N v
-            [kg/s] (wall drag) and of twice the strain rate [N m s], shape (n, 3); projections of the particles onto the
-            velocities that walls admit, shape (n, 3, 3).
+        rows: Shape functions N, a tuple: start of each particle's row, shape (n + 1,), particles and ghosts in the
+            rows, shape (k,), and values and derivatives by x, y, z, shape (k, 4) [1, 1/m].
+        images: Ghosts, mirror images at walls, a tuple: particle that each mirrors, shape (g,), and matrix that maps
+            its vectors to the ghost, shape (g, 3, 3).
+        resisted: Tuple of three: masses over the time step, shape (n,) [kg/s]; coefficients of v - N v [kg/s]
+            (smoothing), of N v [kg/s] (wall drag) and of twice the strain rate [N m s], shape (n, 3); projections of
+            the particles onto the velocities that walls admit, shape (n, 3, 3).
         field: Velocity, shape (n, 3) [m/s].
     """
     inertia, factors, admitted = resisted
@@ -125,18 +134,22 @@ def friction_operator(rows, images, resisted, field):
 
 @njit(cache=True)
 def admitted_rates(rows, images, volumes, admitted):
-    """Return the rows of B restricted to admissible velocities, in the form of ``VolumeRateRows``.
+    """Return the rates of nodal volumes by admissible velocities as sparse rows, one for each particle.
 
-    The correction of nodal integration is left out. A particle and its ghosts make one entry.
+    They are the rows of the matrix B of ``rates_of_volume``, without its correction of nodal integration, in the form
+    of ``VolumeRateRows``. A particle and its ghosts make one entry.
 
     Args:
-        rows: Shape functions: starts (n + 1,), columns (k,) and weights (k, 4), the values and derivatives by x, y, z.
-        images: Ghosts: particle that each mirrors (g,) and reflection of its vectors (g, 3, 3).
+        rows: Shape functions, a tuple: start of each particle's row, shape (n + 1,), particles and ghosts in the rows,
+            shape (k,), and values and derivatives by x, y, z, shape (k, 4) [1, 1/m].
+        images: Ghosts, mirror images at walls, a tuple: particle that each mirrors, shape (g,), and matrix that maps
+            its vectors to the ghost, shape (g, 3, 3).
         volumes: Nodal volumes, shape (n,) [m^3].
         admitted: Projections onto the velocities that walls admit, shape (n, 3, 3).
 
     Returns:
-        Start of each row, shape (n + 1,), particle of each entry, shape (e,), and entries, shape (e, 3) [m^2].
+        Start of each row, shape (n + 1,), particle of each entry, shape (e,), and entries, the rate of the row's volume
+        by the velocity of that particle, shape (e, 3) [m^2].
     """
     (starts, columns, weights), (source, reflection) = rows, images
     count = starts.shape[0] - 1
@@ -169,8 +182,10 @@ def admitted_stiffness(stiffness: sparse.bsr_matrix, admitted: Floats) -> sparse
     """Project a stiffness matrix onto the velocities that walls admit; return the matrix, shape (3 s, 3 s) [N/m].
 
     Args:
-        stiffness: Stiffness by particle, shape (3 s, 3 s) [N/m]; not changed.
-        admitted: Projections of the particles, the first s of which are used, shape (n, 3, 3).
+        stiffness: Stiffness of s surface particles, ordered by particle in 3 x 3 blocks, shape (3 s, 3 s) [N/m]; not
+            changed.
+        admitted: Projection of each particle onto the velocities that walls admit, shape (n, 3, 3); the first s are
+            used.
     """
     blocks = projected_blocks(stiffness.indptr, stiffness.indices, stiffness.data, admitted)
     return sparse.bsr_matrix((blocks, stiffness.indices, stiffness.indptr), shape=stiffness.shape)

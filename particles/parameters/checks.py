@@ -62,7 +62,7 @@ def scheme_problems(solder: Solder) -> list[Problem]:
 
 
 def ispg_problems(solder: Solder, place: str | None) -> list[Problem]:
-    """Find the use of the scheme ispg where it is not verified; no or one input error.
+    """Find the use of the scheme ispg for a scene where it is not verified; return no or one input error.
 
     Args:
         solder: Solder with the selected scheme; other schemes have no problem.
@@ -78,7 +78,7 @@ def effect_problems(solder: Solder, effects: Mapping[str, Decision]) -> list[Pro
     """Find solder that never comes to rest because neither surface tension nor inertia acts.
 
     Args:
-        solder: Solder of the case.
+        solder: Solder of the case: volume, fluid, contact angles and numerics.
         effects: Name -> decision; ``surface_tension`` and ``inertia`` are used.
 
     Returns:

@@ -52,6 +52,10 @@ def decide_effects(geometry: JointGeometry, solder: Solder) -> dict[str, Decisio
     """Decide on each effect of the reflow of a joint: name -> decision.
 
     A decision has the state ``on``, the reason ``why`` and, if predicted, the relative ``influence`` on the result.
+
+    Args:
+        geometry: Gap and radii of the joint.
+        solder: Fluid, process and the switches of the effects.
     """
     return decide(dimensionless_numbers(geometry, solder), solder)
 
@@ -73,20 +77,27 @@ def decide_oscillation(solder: Solder) -> dict[str, Decision]:
     """Decide on each effect of a free oscillating drop: name -> decision.
 
     A decision has the state ``on``, the reason ``why`` and, if predicted, the relative ``influence`` on the result.
+
+    Args:
+        solder: Volume, fluid and the switches of the effects.
     """
     return decide_all(LIQUID_EFFECTS, LiquidScene(drop_numbers(solder), solder, has_wall=False, swings=True))
 
 
 def switched(effects: Mapping[str, Decision]) -> dict[str, bool]:
-    """Return which effects are on, name -> bool, from the decisions on them."""
+    """Return whether each effect is on, name -> bool, from the decisions on them.
+
+    Args:
+        effects: Name -> decision, of which ``on`` is read.
+    """
     return {name: decision["on"] for name, decision in effects.items()}
 
 
 def acting(effects: Mapping[str, bool]) -> Iterator[LiquidEffect]:
-    """Yield the effects that are on, in the order in which they are added to the physics.
+    """Yield the records of the effects that are on, in the order in which they are added to the physics.
 
     Args:
-        effects: Name -> on or off; missing effects are off.
+        effects: Name of an effect, such as "inertia" -> on or off; missing effects are off.
 
     Raises:
         KeyError: A name is unknown.
@@ -107,7 +118,7 @@ def acting_weight(solder: Solder, effects: Mapping[str, Decision]) -> float:
 
 
 def asymmetric_effect(effects: Mapping[str, Decision]) -> LiquidEffect | None:
-    """Return the first effect that is on and breaks the axis and the planes of symmetry of a drop; None without one.
+    """Return the record of the first effect that is on and breaks a drop's axis and planes of symmetry; None without.
 
     Args:
         effects: Name -> decision, of which ``on`` is read.
@@ -116,5 +127,10 @@ def asymmetric_effect(effects: Mapping[str, Decision]) -> LiquidEffect | None:
 
 
 def reference_weight(solder: Solder, effects: Mapping[str, Decision]) -> float | None:
-    """Return the specific weight of the Young-Laplace reference [N/m^3]; None if the shapes are not axisymmetric."""
+    """Return the specific weight of the Young-Laplace reference [N/m^3]; None if shapes are not axisymmetric.
+
+    Args:
+        solder: Density, and values that other effects with a weight need.
+        effects: Name -> decision, of which ``on`` is read.
+    """
     return None if asymmetric_effect(effects) else acting_weight(solder, effects)

@@ -35,7 +35,12 @@ def particle_count(solder: Solder, geometry: JointGeometry) -> int:
 
 
 def reflow_seconds(solder: Solder, geometry: JointGeometry) -> float:
-    """Estimate the time of ``solve_joint`` on one core [s], from the measured cost of a step."""
+    """Estimate the wall time of the reflow of one joint on one core [s], from the measured cost of a step.
+
+    Args:
+        solder: Volume, fluid, and spacing of the particles.
+        geometry: Gap and radii of the joint.
+    """
     particles = particle_count(solder, geometry)
     if solder.numerics.scheme == "ispg":
         return ispg_seconds(particles, ISPG_STEPS_OF_JOINT)
@@ -43,23 +48,23 @@ def reflow_seconds(solder: Solder, geometry: JointGeometry) -> float:
 
 
 def drop_seconds(particles: int) -> float:
-    """Estimate the time to bring a drop to rest on one core [s]."""
+    """Estimate the wall time to bring a drop of ``particles`` particles to rest on one core [s]."""
     return TYPICAL_STEPS_OF_DROP * _seconds_per_step(particles)
 
 
 def inertial_seconds(particles: int, steps: int) -> float:
-    """Estimate the time of steps with inertia or viscosity on one core [s]."""
+    """Estimate the wall time of ``steps`` time steps with inertia or viscosity on one core [s]."""
     growing = SECONDS_PER_INERTIAL_STEP_OF_THOUSAND * (particles / 1000.0) ** INERTIAL_COST_EXPONENT
     return steps * (SECONDS_PER_INERTIAL_STEP + growing)
 
 
 def ispg_seconds(particles: int, steps: int) -> float:
-    """Estimate the time of steps of the scheme ispg on one core [s]."""
+    """Estimate the wall time of ``steps`` time steps of the scheme ispg on one core [s]."""
     return steps * (SECONDS_PER_ISPG_STEP + SECONDS_PER_ISPG_STEP_AND_PARTICLE * particles)
 
 
 def section_seconds(particles: int, steps: int) -> float:
-    """Estimate the time of steps of a section on one core [s]."""
+    """Estimate the wall time of ``steps`` time steps of a two-dimensional drop in section on one core [s]."""
     of_matrices = SECONDS_PER_SECTION_STEP_AND_PAIR * particles**2
     return steps * (SECONDS_PER_SECTION_STEP + SECONDS_PER_SECTION_STEP_AND_PARTICLE * particles + of_matrices)
 

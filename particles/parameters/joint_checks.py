@@ -27,7 +27,7 @@ def joint_problems(joint: Joint, solder: Solder) -> list[Problem]:
     """Find problems of a joint before it runs: the checks of an array without neighbours, under the keys of a joint.
 
     Args:
-        joint: Volume, pads, package and resolution.
+        joint: Scene of the joint: volume, pads, package and resolution.
         solder: Fluid, process and numerics.
 
     Returns:

@@ -32,7 +32,13 @@ class Numbers:
 
 
 def dimensionless_numbers(geometry: JointGeometry, solder: Solder) -> Numbers:
-    """Compute the numbers of a joint; H is the gap and L the radius of a cylinder of equal volume and height H.
+    """Compute the dimensionless numbers of a joint of solder.
+
+    The height H is the gap, the length L the radius of a cylinder of equal volume and height H.
+
+    Args:
+        geometry: Gap between the pads.
+        solder: Volume, density, viscosity, surface tension and gravity.
 
     Returns:
         Bond and Ohnesorge number, capillary and viscous time [s].
@@ -42,7 +48,9 @@ def dimensionless_numbers(geometry: JointGeometry, solder: Solder) -> Numbers:
 
 
 def drop_numbers(solder: Solder) -> Numbers:
-    """Compute the numbers of a drop: Bond number from V^(1/3), others from the radius of a sphere of equal volume.
+    """Compute the dimensionless numbers of a drop from the properties of its solder.
+
+    The Bond number refers to V^(1/3), the others to the radius of a sphere of equal volume.
 
     Returns:
         Bond and Ohnesorge number, capillary and viscous time [s].

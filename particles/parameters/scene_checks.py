@@ -272,7 +272,15 @@ def oscillation_problems(scene: Oscillation, solder: Solder) -> list[Problem]:
 
 
 def free_problems(scene: HasWall, solder: Solder) -> list[Problem]:
-    """Find effects switched on that need a wall, in a scene without one; one input error for each, none with a wall."""
+    """Find effects that are switched on but need a wall, in a scene without one.
+
+    Args:
+        scene: Scene that may have a wall.
+        solder: Solder, whose switches of effects are examined.
+
+    Returns:
+        One ``Problem`` (key, message, value, allowed values) for each; empty for a scene with a wall.
+    """
     if not scene.is_free:
         return []
     switches = {effect.key: getattr(solder.effects, effect.name) for effect in LIQUID_EFFECTS if effect.needs_wall}

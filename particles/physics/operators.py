@@ -123,8 +123,8 @@ def wall_areas(body: Body, space: Discretisation) -> Floats:
     includes faces of the free surface, which are subtracted.
 
     Args:
-        body: Liquid body.
-        space: Discretisation of the body, with the volume gradients of its particles.
+        body: Liquid body: particles, triangles of its free surface, and plates.
+        space: Sparse operators at the particles, of which the volume gradients are used.
     """
     corners = body.points[body.triangles]
     vectors = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 6.0

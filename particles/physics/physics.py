@@ -140,13 +140,13 @@ class Acting(Protocol):
 def plate_wrench(body: Body, others: Sequence[Force], wall: int) -> Floats:
     """Compute the wrench of the solder on a plate.
 
-    A moving plate carries its contact line along, and the energy E - p V changes by the forces on the line: the
-    tension of the free surface, and the pressure on the wetted area and on the line's share of the free surface.
+    A moving plate carries its contact line along, and the energy E - p V changes by the forces on the line: the tension
+    of the free surface, and the pressure on the wetted area and on the line's share of the free surface.
 
     Args:
         body: Body at rest.
-        others: Surface forces except wetting, since the wetted area does not change.
-        wall: Index of the plate.
+        others: Surface forces that act, except wetting, since the wetted area does not change with the plate.
+        wall: Index of the plate in ``body.plates``.
 
     Returns:
         Force [N] and moment about the origin of the plate [N m], shape (6,).

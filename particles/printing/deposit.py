@@ -295,8 +295,9 @@ def add_to_ground(ground: LevelSet, body: CuredBody) -> None:
     """Add a solid body and its mirror image behind the plate to the level set of the ground.
 
     Args:
-        ground: Distance to the solid bodies, negative in them; changed in place near the body.
-        body: Solid body, which ends on the plate z = 0.
+        ground: Level set: distance to the solid bodies at the nodes of a grid [m], negative in them; changed in place
+            near the body.
+        body: Solid body (vertices and triangles), which ends on the plate z = 0.
     """
     points, triangles = with_mirror_image(body.points, body.triangles)
     part, nodes = ground.grid.part_around(points, MARGIN)
@@ -305,10 +306,10 @@ def add_to_ground(ground: LevelSet, body: CuredBody) -> None:
 
 
 def empty_ground(scene: Printing, spacing: float) -> LevelSet:
-    """Return a level set without solid bodies on a grid around the whole print.
+    """Return the level set of a ground without solid bodies: large distances [m] on a grid around the whole print.
 
     Args:
-        scene: Printing parameters.
+        scene: Parameters of the print: drops, their positions and order, ink, curing and numerics.
         spacing: Particle spacing [m].
     """
     places = np.array(scene.places())

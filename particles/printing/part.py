@@ -86,8 +86,8 @@ def part_of(scene: Printing, deposit: Deposit) -> Part:
     """Assemble the printed part from the solid bodies of a deposit.
 
     Args:
-        scene: Printing parameters.
-        deposit: State of the print after its last drop.
+        scene: Parameters of the print: drops, their positions and order, ink, curing and numerics.
+        deposit: State of the print after its last drop: solid bodies, ink and particles.
 
     Returns:
         Surface, height map, layers and voids; gaps narrower than the resolution are closed.
@@ -161,13 +161,14 @@ def measure_part(scene: Printing, deposit: Deposit, part: Part) -> Metrics:
     """Return the metrics of a printed part: name -> (value, unit).
 
     Args:
-        scene: Printing parameters.
+        scene: Parameters of the print: drops, their positions and order, ink, curing and numerics.
         deposit: State of the print after its last drop, with its particles.
         part: Printed part that ``part_of`` returned.
 
     Returns:
-        Number of drops, errors of the volume, largest number of separate bodies, roughness, heights, footprint and
-        voids.
+        ``drops``, ``volume_error``, ``volume_drift``, ``part_volume`` [m^3], ``connected_parts_max`` (largest number of
+        separate bodies), ``roughness_sa``, ``roughness_sz``, ``height_mean``, ``height_max``, ``layer_rise_min`` [m],
+        ``footprint`` [m^2], ``voids`` (their number) and ``void_volume`` [m^3], among others.
     """
     printed = scene.drops * scene.drop_volume
     bodies = sum(layer.volume for layer in part.layers)

@@ -81,15 +81,15 @@ NUMBERS = ("landed", "since", "followed", "steps", "particle_steps", "left", "se
 def solve_printing(
     scene: Printing, progress: Callable[[float], None] | None = None, checkpoint: Checkpoint | None = None
 ) -> tuple[FlowResult, Part]:
-    """Print a part.
+    """Simulate the printing of a part, drop by drop, and measure it.
 
     The metric ``spray_share`` is the largest share of the liquid present at one time that was outside its surface, so
     it also detects one drop that splashes among many.
 
     Args:
-        scene: Printing parameters.
-        progress: Called with the fraction of drops that are solid.
-        checkpoint: Checkpoint to continue from and to write.
+        scene: Parameters of the print: drops, their positions and order, ink, curing and numerics.
+        progress: Function called with the fraction of drops that are solid, 0 to 1.
+        checkpoint: Checkpoint to continue from, if its file exists, and to write.
 
     Returns:
         History, pictures and metrics of the run, and the printed part.

@@ -33,7 +33,10 @@ FRONT = (1.219, 1.602, 1.997), (1.725, 2.137, 2.619)
 
 
 def measured_pressure(width: float, tank: float, sensor: float) -> Floats | None:
-    """Return the measured times [sqrt(H / g)] and pressures [rho g H], shape (2, k); None for a different geometry.
+    """Return the measured pressure history at a sensor after a dam break, rows time and pressure, shape (2, k).
+
+    Times are in sqrt(H / g), pressures in rho g H, with the height H of the column. None is returned for a geometry
+    that was not measured.
 
     Args:
         width: Width of the column over its height.

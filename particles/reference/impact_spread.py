@@ -73,7 +73,7 @@ def wildeman(weber: float, reynolds: float, angle: float) -> float:
 
 
 def of_measured(weber: float, reynolds: float, angle: float) -> tuple[float, float] | None:
-    """Return the smallest and the largest spread over the diameter by the correlations of measured drops.
+    """Return the range of maximum spread over the diameter that the correlations of measured impacts predict.
 
     Args:
         weber: Weber number rho U^2 D / gamma.

@@ -24,7 +24,7 @@ def shape_error(points: Floats, triangles: Indices, meridian: Meridian) -> float
     Args:
         points: Positions, shape (n, 3) [m].
         triangles: Triangles of the surface, shape (t, 3); a part cut by planes of symmetry is sufficient.
-        meridian: Exact meridian.
+        meridian: Exact meridian: radii and heights of the curve that revolves about z.
     """
     corners = points[triangles]
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)

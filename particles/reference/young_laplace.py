@@ -80,6 +80,10 @@ def joint_meridian(  # noqa: PLR0913 - six physical numbers define a joint
         angle_limits: Contact angles of pad and mask [rad]. An end whose angle would exceed a limit leaves its edge and
             takes the limit as contact angle (Gibbs). By default, both ends stay pinned.
 
+    Returns:
+        Radii and heights of the meridian [m], pressure at z = 0 [Pa], axial force on the package [N] and contact angles
+        [rad].
+
     Raises:
         NoMeridian: The boundary value problem has no solution near the family of smooth barrels.
     """
@@ -189,6 +193,9 @@ def sessile_meridian(volume: float, contact_angle: float, surface_tension: float
         contact_angle: Contact angle [rad], in (0, pi).
         surface_tension: Surface tension gamma [N/m].
         weight: Specific weight rho g [N/m^3].
+
+    Returns:
+        Radii and heights of the meridian [m], pressure at z = 0 [Pa], axial force [N] and contact angle [rad].
     """
     cap = np.cbrt(np.pi / 3.0 * (1.0 - np.cos(contact_angle)) ** 2 * (2.0 + np.cos(contact_angle)))
     return _sessile(np.cbrt(volume), cap, contact_angle, _Fluid(surface_tension, weight), is_plane=False)
@@ -204,6 +211,9 @@ def sessile_section(area: float, contact_angle: float, surface_tension: float, w
         contact_angle: Contact angle [rad], in (0, pi).
         surface_tension: Surface tension gamma [N/m].
         weight: Specific weight rho g [N/m^3].
+
+    Returns:
+        Distances from the middle and heights of the curve [m], pressure at z = 0 [Pa] and contact angle [rad].
     """
     segment = np.sqrt(contact_angle - np.sin(contact_angle) * np.cos(contact_angle))
     return _sessile(np.sqrt(area), segment, contact_angle, _Fluid(surface_tension, weight), is_plane=True)
@@ -241,7 +251,15 @@ def _sessile(length: float, weightless: float, contact_angle: float, fluid: _Flu
 
 
 def sphere_meridian(volume: float, surface_tension: float) -> Meridian:
-    """Return the meridian of a free drop centred at the origin, from volume [m^3] and surface tension [N/m]."""
+    """Return the meridian of a free drop centred at the origin, a half circle.
+
+    Args:
+        volume: Volume [m^3].
+        surface_tension: Surface tension gamma [N/m].
+
+    Returns:
+        Radii and heights of the meridian [m], and the pressure in the drop [Pa].
+    """
     radius, psi = float(np.cbrt(3.0 * volume / (4.0 * np.pi))), np.linspace(0.0, np.pi, SAMPLES)
     pressure = 2.0 * surface_tension / radius
     return Meridian(radius * np.sin(psi), -radius * np.cos(psi), pressure, 0.0, float("nan"), float("nan"))
@@ -274,6 +292,9 @@ def pad_meridian(
         surface_tension: Surface tension gamma [N/m].
         weight: Specific weight rho g [N/m^3].
         angle_limits: Contact angles of pad and mask [rad].
+
+    Returns:
+        Radii and heights of the meridian [m], pressure at z = 0 [Pa], axial force [N] and contact angle [rad].
     """
     from scipy.optimize import brentq
 

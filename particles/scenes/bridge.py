@@ -38,9 +38,9 @@ def solve_bridge(
 
     Args:
         geometries: Geometries of both joints, coaxial.
-        shapes: Shapes of both joints at rest alone.
+        shapes: Shapes (particles, surface, history and metrics) of both joints at rest alone.
         distance: Distance of their axes along x [m].
-        solder: Solder of one joint.
+        solder: Solder of one joint: volume, fluid, contact angles and numerics.
 
     Returns:
         Common body at rest, with the verdict "bridged"; its origin is midway between the axes.

@@ -21,8 +21,8 @@ from reflowshock.particles.parameters.effects import acting_weight, decide_effec
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.forces import Wetting
 from reflowshock.particles.physics.physics import plate_wrench
-from reflowshock.particles.scenes.metrics import reference_meridian
 from reflowshock.particles.scenes.moving_joint import travel
+from reflowshock.particles.scenes.reference_shapes import reference_meridian
 from reflowshock.particles.scenes.reflow import LiquidJoint, solve_joint
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import RECORDS, NotAtRest, Run, run_to_rest
@@ -124,6 +124,9 @@ def carried_shape(place: JointGeometry, solder: Solder, first: Checkpoint, last:
         solder: Volume, fluid and numerics, as in ``carry_joint``.
         first: Checkpoint of the first reflow; may equal ``last``.
         last: Checkpoint of the last exchange; empty if the joint was open from the start.
+
+    Returns:
+        Particles, surface, history and metrics at rest.
 
     Raises:
         TooLittleSolder: No cone of the volume spans the gap, although a drop would reach the other pad.

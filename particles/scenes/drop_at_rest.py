@@ -16,7 +16,8 @@ from reflowshock.particles.parameters.scenes import Drop
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.reference.young_laplace import Meridian, sessile_meridian, sessile_section, sphere_meridian
 from reflowshock.particles.scenes.flow_setup import contact_line, start_flow, stop_rule
-from reflowshock.particles.scenes.metrics import Metrics, body_metrics, reference_drop, with_shape_error
+from reflowshock.particles.scenes.metrics import Metrics, body_metrics, with_shape_error
+from reflowshock.particles.scenes.reference_shapes import reference_drop
 from reflowshock.particles.scenes.reflow import collect_shape
 from reflowshock.particles.scenes.section_drop import start_section
 from reflowshock.particles.section.section import Section
@@ -57,7 +58,7 @@ def drop_to_rest(
     """Compute a drop at rest and compare it with its exact shape.
 
     Args:
-        drop: Volume, wall, resolution and initial motion.
+        drop: Scene of the drop: volume, wall, resolution and initial motion.
         solder: Fluid and process, with the volume of the drop.
         progress: Function called with the fraction done, 0 to 1.
         checkpoint: File from which the run continues, to the last bit, and to which it saves its state.

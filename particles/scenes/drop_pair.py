@@ -16,7 +16,8 @@ from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.reference.young_laplace import Meridian, sphere_meridian
 from reflowshock.particles.scenes.drops import MovingDrop, run_drops
 from reflowshock.particles.scenes.flow_setup import contact_line, start_flow, stop_rule
-from reflowshock.particles.scenes.metrics import Metrics, body_metrics, particle_pressure, reference_drop
+from reflowshock.particles.scenes.metrics import Metrics, body_metrics, particle_pressure
+from reflowshock.particles.scenes.reference_shapes import reference_drop
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run
 from reflowshock.particles.steps.shape import JointShape, Snapshot, concatenate_shapes, shifted_indices

@@ -95,13 +95,14 @@ def run_drops(
 
     Args:
         flows: Flow of each drop, advanced in place.
-        rule: Rule that ends the flow of a drop.
+        rule: Criteria by which the flow of a drop ends: tolerance and duration of rest, number of steps, end of the
+            process.
         start: Function of a body that returns its flow, for merged and remeshed drops.
         checkpoint: File from which the run continues, to the last bit, and to which it saves its state.
         progress: Function called with the fraction done, 0 to 1, of the drop with most left to do.
 
     Returns:
-        The remaining drops at rest.
+        The remaining drops at rest, each with its flow, its step records, and the drops that merged into it.
 
     Raises:
         OverlappingDrops: Drops overlap at the start, so that they cannot both have their volume.

@@ -28,9 +28,9 @@ def start_flow(cloud: Cloud, solder: Solder, effects: Mapping[str, bool], lines:
     """Set up the flow of a liquid at rest, with only the active effects.
 
     Args:
-        cloud: Particles of the liquid.
+        cloud: Particles of the liquid, its free surface and contact lines.
         solder: Fluid properties and numerics, which select the step solver.
-        effects: Name -> on or off; missing effects are off.
+        effects: Name of an effect, such as "inertia" -> on or off; missing effects are off.
         lines: Contact lines, one per ring of the cloud; empty for a free drop.
 
     Returns:
@@ -45,12 +45,12 @@ def start_flow(cloud: Cloud, solder: Solder, effects: Mapping[str, bool], lines:
 def build_physics(
     solder: Solder, effects: Mapping[str, bool], lines: tuple[ContactLine, ...], in_section: bool = False
 ) -> Physics:
-    """Return the physics of the active effects.
+    """Return the physics of the active effects: their forces, friction, momentum, contact lines and constraints.
 
     Args:
-        solder: Fluid properties.
+        solder: Fluid properties and walls.
         effects: Name -> on or off, as decided by ``decide_effects``; missing effects are off.
-        lines: Contact lines.
+        lines: Contact lines, in the order of the plates; empty for a free drop.
         in_section: Whether the liquid is a drop in section, whose surface is a polyline.
     """
     physics = Physics((), (Mass(solder.density),), (), (), lines)
@@ -64,13 +64,16 @@ def build_physics(
 
 
 def contact_line(cloud: Cloud, wall: int, radius: float, solder: Solder) -> ContactLine:
-    """Set up the contact line around one pad at the origin of a plate.
+    """Set up the contact line around one pad at the origin of a plate; it can be pinned at the pad's edge.
 
     Args:
         cloud: Particles with one ring per plate.
         wall: Index of the plate.
         radius: Radius of the pad [m]; infinite for a uniform wall.
         solder: Contact angles of pad and mask.
+
+    Returns:
+        Contact line with the states of its vertices: pinned, on the pad or on the mask.
     """
     ring, pad = cloud.rings[wall], Pad((0.0, 0.0), radius, solder.pad_contact_angle)
     local = cloud.plates[wall].local(cloud.points[ring])
@@ -100,11 +103,14 @@ def stop_rule(cloud: Cloud, solder: Solder, effects: Mapping[str, bool], angle: 
     """Return the rule that ends a flow: at rest, or with inertia at the end of the process at the latest.
 
     Args:
-        cloud: Particles of the liquid.
+        cloud: Particles of the liquid, whose spacing sets the limits.
         solder: Fluid, process and numerics.
-        effects: Name -> on or off; missing effects are off.
+        effects: Name of an effect, such as "inertia" -> on or off; missing effects are off.
         angle: Contact angle [rad] of the spherical cap that oscillates as slowly as the body: the contact angle of a
             drop on a uniform wall; the default for a body that edges or friction hold; None for a free drop.
+
+    Returns:
+        Largest number of steps, tolerance and duration of rest, and end of the process.
     """
     calm_time = CALM_CAPILLARY_TIMES * capillary_limit(solder.density, cloud.spacing, solder.surface_tension)
     steps, tolerance = most_steps(solder, cloud.spacing), solder.numerics.tolerance

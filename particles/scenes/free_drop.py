@@ -147,6 +147,9 @@ def solve_free_drop(  # noqa: PLR0913 - the motion, its resolution and its contr
         progress: Function called with the fraction done, 0 to 1.
         checkpoint: File from which the run continues, to the last bit, and to which it saves its state.
 
+    Returns:
+        Final particles and surface, history of amplitude and energies, snapshots and metrics.
+
     Raises:
         ValueError: The spacing leaves fewer than two shells of particles.
         SolveFailed: A linear solve failed.
@@ -248,7 +251,7 @@ def solve_oscillation(
     """Compute an oscillating drop and return its final shape, with history and snapshots.
 
     Args:
-        scene: Volume, amplitude, duration and resolution.
+        scene: Free drop: volume, amplitude of the second mode, duration and resolution.
         solder: Fluid, with the volume of the scene.
         progress: Function called with the fraction done, 0 to 1.
         checkpoint: File from which the run continues, to the last bit, and to which it saves its state.
@@ -289,7 +292,7 @@ def fit_oscillation(time: Floats, values: Floats, frequency: float) -> tuple[flo
 
     Args:
         time: Times, shape (k,) [s], over more than a period.
-        values: Values, shape (k,).
+        values: Values of the oscillation in any unit, shape (k,).
         frequency: Guess of the angular frequency within about 20 % [rad/s]; a guess of half the frequency is detected,
             since the harmonic is then larger.
     """

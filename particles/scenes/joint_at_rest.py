@@ -13,8 +13,9 @@ from reflowshock.particles.parameters.scenes import FloatingPackage, Joint
 from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.plate_motion import LIFT, SHIFT, TURN, Floating
 from reflowshock.particles.reference.young_laplace import Meridian
-from reflowshock.particles.scenes.metrics import Metrics, reference_meridian, with_shape_error
+from reflowshock.particles.scenes.metrics import Metrics, with_shape_error
 from reflowshock.particles.scenes.moving_joint import follow_path, settle_joint
+from reflowshock.particles.scenes.reference_shapes import reference_meridian
 from reflowshock.particles.scenes.reflow import solve_joint
 from reflowshock.particles.steps.shape import JointShape
 
@@ -52,7 +53,7 @@ def joint_to_rest(
     """Compute the solder of a joint, and a floating package, at rest.
 
     Args:
-        joint: Volume, pads, package and resolution.
+        joint: Scene of the joint: volume, pads, package and resolution.
         solder: Fluid and process, with the volume of the joint.
         progress: Function called with the fraction done, 0 to 1.
         checkpoints: Function of the number of a target of the path that returns its checkpoint; joints without a path
@@ -95,7 +96,7 @@ def joint_to_rest(
 
 
 def floating(package: FloatingPackage) -> Floating:
-    """Return the motion of a floating package: the plate 1 under its load [N], free in the directions of the case.
+    """Return the motion of a floating package: plate 1 of the joint under a load [N], with its free directions.
 
     Args:
         package: Package with the force that presses it down [N] and the names of its free directions (lift, shift,

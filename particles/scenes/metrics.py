@@ -20,7 +20,8 @@ from reflowshock.particles.parameters.solder import Solder
 from reflowshock.particles.physics.forces import Gravity, Wetting
 from reflowshock.particles.physics.physics import BodyForce, Force, plate_wrench
 from reflowshock.particles.reference.shape_error import shape_error
-from reflowshock.particles.reference.young_laplace import Meridian, NoMeridian, joint_meridian, pad_meridian
+from reflowshock.particles.reference.young_laplace import Meridian
+from reflowshock.particles.scenes.reference_shapes import reference_drop, reference_meridian, width_change_bound
 from reflowshock.particles.steps.flow import LiquidFlow
 from reflowshock.particles.steps.rest import Run
 from reflowshock.particles.steps.shape import JointShape
@@ -29,7 +30,6 @@ from reflowshock.particles.surface.contact_line import ON_MASK, ON_PAD, ContactL
 
 Metrics = dict[str, tuple[float, str]]
 LITTLE = 1e-3  # spacings
-WIDTH_CHANGE, TILT_LEVER = 0.1, 2.0
 JOINT_NAMES = {
     "height": "drop_height",
     "height_error": "drop_height_error",
@@ -42,9 +42,14 @@ JOINT_NAMES = {
 def joint_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
     """Return the metrics of a joint at the end of its run: name -> (SI value, unit; angles in deg).
 
-    They are sizes of the shape at the end of ``flow``, contact angles, pressure, axial force, time to rest from the
-    steps of ``run``, cost and energy budget. Errors refer to the Young-Laplace joint of the final ``geometry``; they
-    are nan if it does not exist.
+    They are sizes, contact angles, pressure, axial force, time to rest, cost and energy budget. Errors refer to the
+    Young-Laplace joint; they are nan if it does not exist.
+
+    Args:
+        geometry: Final gap, radii, offset and tilt of the joint.
+        solder: Volume, contact angles and fluid.
+        flow: Flow at the end of the run: body, physics and time.
+        run: Steps of the run: a record and a profile of each, and snapshots.
     """
     reference = reference_meridian(geometry, solder, _reference_weight(flow))
     errors = _joint_errors(solder, flow, run, reference) | _width_error(geometry, solder, flow, run)
@@ -59,8 +64,8 @@ def drop_metrics(solder: Solder, pad_radius: float, flow: LiquidFlow, run: Run) 
     Args:
         solder: Volume, contact angles and fluid.
         pad_radius: Radius of the pad [m], infinite for a uniform wall.
-        flow: Flow at the end of the run.
-        run: Records of the steps.
+        flow: Flow at the end of the run: body, physics and time.
+        run: Steps of the run: a record and a profile of each, and snapshots.
 
     Returns:
         Metrics of ``body_metrics``: name -> (SI value, unit; angles in deg).
@@ -71,8 +76,14 @@ def drop_metrics(solder: Solder, pad_radius: float, flow: LiquidFlow, run: Run) 
 def body_metrics(solder: Solder, reference: Meridian | None, flow: LiquidFlow, run: Run) -> Metrics:
     """Return the metrics of a drop: name -> (SI value, unit; angles in deg).
 
-    They are sizes, contact, pressure, time to rest, cost and energy budget. Errors against the exact meridian are
-    omitted if ``reference`` is None, contact radius and angles without contact lines.
+    They are sizes, contact radius and angles, pressure, time to rest, cost and energy budget. Contact radius and angles
+    are omitted without contact lines.
+
+    Args:
+        solder: Volume, contact angles and fluid.
+        reference: Exact meridian; None omits the errors.
+        flow: Flow at the end of the run: body, physics and time.
+        run: Steps of the run: a record and a profile of each, and snapshots.
     """
     profile = run.profiles[-1]
     height, width = profile.drop_height(len(flow.body.cloud.rings)), profile.max_width
@@ -89,7 +100,7 @@ def body_metrics(solder: Solder, reference: Meridian | None, flow: LiquidFlow, r
 def with_shape_error(
     shape: JointShape, solder: Solder, reference: Meridian | None, surface: Body | None = None
 ) -> JointShape:
-    """Add the metric ``shape_error``: the RMS distance to the reference over the cube root of the volume.
+    """Return a copy with the metric ``shape_error``: RMS distance to the reference over the cube root of the volume.
 
     Args:
         shape: Shape at rest.
@@ -122,8 +133,14 @@ def _contact(solder: Solder, flow: LiquidFlow, reference: Meridian | None) -> Me
 def drop_errors(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
     """Return the errors in height and shape of a drop on one pad against the exact drop of its volume.
 
-    ``drop_height_error`` is relative to the height, ``drop_shape_error`` to the cube root of the volume. The result is
-    empty for a pendant drop with weight, which has no reference.
+    Args:
+        solder: Volume of the drop, contact angles and fluid.
+        flow: Flow at the end of the run: body, physics and time.
+        run: Steps of the run: a record and a profile of each, and snapshots.
+
+    Returns:
+        ``drop_height_error``, relative to the height, and ``drop_shape_error``, relative to the cube root of the
+        volume; empty for a pendant drop with weight, which has no reference.
     """
     body, plate, pad = flow.body, flow.body.plates[0], flow.physics.lines[0].pads[0]
     volume, weight = body.volume()[0], _reference_weight(flow)
@@ -141,7 +158,14 @@ def drop_errors(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
 def open_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
     """Return the metrics of an open joint with a drop on the board, under the names of a joint; axial force 0.
 
-    The gap of ``geometry`` is the standoff; values are (SI value, unit; angles in deg).
+    Args:
+        geometry: Geometry of the joint; its gap is the standoff.
+        solder: Volume of the drop, contact angles and fluid.
+        flow: Flow of the drop at the end of its run.
+        run: Steps of that run.
+
+    Returns:
+        Name -> (SI value, unit; angles in deg).
     """
     drop = drop_metrics(solder, geometry.radius_board, flow, run)
     renamed = {JOINT_NAMES.get(name, name): number for name, number in drop.items()}
@@ -149,10 +173,16 @@ def open_metrics(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run:
 
 
 def bridge_metrics(gap: float, solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
-    """Return the metrics of joints that merged into one body between plates at a distance ``gap`` [m], without errors.
+    """Return the metrics of joints that merged into one body between two plates, without errors.
 
-    Name -> (SI value, unit) of volume, ``standoff``, ``length`` along x, axial force, pressure, rest and cost;
-    ``solder`` has the total volume of the joints.
+    Args:
+        gap: Distance of the plates [m].
+        solder: Solder with the total volume of the joints.
+        flow: Flow of the common body at the end of its run.
+        run: Steps of that run.
+
+    Returns:
+        Name -> (SI value, unit) of volume, ``standoff``, ``length`` along x, axial force, pressure, rest and cost.
     """
     length = float(np.ptp(flow.body.points[:, 0]))
     shape: Metrics = {"standoff": (gap, "m"), "length": (length, "m"), "axial_force": (axial_force(flow), "N")}
@@ -170,7 +200,7 @@ def _reference_weight(flow: LiquidFlow) -> float | None:
 
 
 def particle_pressure(flow: LiquidFlow) -> Floats:
-    """Return the pressure of the particles above ambient, including the hydrostatic part, shape (n,) [Pa].
+    """Return the pressure above ambient at the particles of a flow's body, hydrostatic part included, shape (n,) [Pa].
 
     Gravity acts as a surface force, so the pressure of the solver lacks the hydrostatic part.
     """
@@ -183,20 +213,35 @@ def particle_pressure(flow: LiquidFlow) -> Floats:
 
 
 def contact_radius(body: Body, wall: int) -> float:
-    """Return the radius of a disc with the wetted area of a wall [m]."""
+    """Return the radius of a disc with the area that a body wets on a wall [m].
+
+    Args:
+        body: Liquid body: particles, triangles of its free surface, and plates.
+        wall: Index of the wall in ``body.plates``.
+    """
     line = whole_points(body.cloud, body.points, wall)[0]
     return float(np.sqrt(ring_area(line, np.arange(len(line), dtype=np.int32)) / np.pi))
 
 
 def mean_angle(cosines: Floats) -> float:
-    """Return the contact angle [deg] of the mean of cosines, shape (k,): one for each vertex of a contact line."""
+    """Return the contact angle whose cosine is the mean of ``cosines`` [deg].
+
+    Args:
+        cosines: Cosine of the contact angle at each vertex of a contact line, shape (k,).
+    """
     return float(np.degrees(np.arccos(np.clip(cosines.mean(), -1.0, 1.0))))
 
 
 def verdict(lines: Sequence[ContactLine], ruptured: bool) -> str:
-    """Return the verdict on a joint or drop, the first that applies.
+    """Return the verdict on a joint or drop as a word.
 
-    "open" (neck ruptured), "bridged" (line on several pads), "overflow" (on the mask), "dewetted" (off the edge), "ok".
+    Args:
+        lines: Contact lines of the body.
+        ruptured: Whether the neck has ruptured.
+
+    Returns:
+        The first that applies: "open" (neck ruptured), "bridged" (line on several pads), "overflow" (on the mask),
+        "dewetted" (off the edge), "ok".
     """
     if ruptured:
         return "open"
@@ -262,7 +307,7 @@ def _width_error(geometry: JointGeometry, solder: Solder, flow: LiquidFlow, run:
 
 
 def axial_force(flow: LiquidFlow) -> float:
-    """Return the force of the liquid on the package along +z [N]."""
+    """Return the force of the liquid on the package (the second plate of the flow's body) along +z [N]."""
     on_package = [wall for wall, plate in enumerate(flow.body.plates) if plate.side > 0.0]
     return float(sum(plate_wrench(flow.body, _others(flow), wall)[2] for wall in on_package))
 
@@ -301,7 +346,7 @@ def _cost_and_rest(solder: Solder, flow: LiquidFlow, run: Run) -> Metrics:
 
 
 def particles_lost(body: Body) -> int:
-    """Count interior particles outside the body: beyond the surface or a wall, or detached from their wall.
+    """Return the number of interior particles outside the body: beyond the surface or a wall, or detached from a wall.
 
     Particles on a wall are tested slightly above it. At planes of symmetry the mirror image of the body closes it.
     """
@@ -322,10 +367,13 @@ def particles_lost(body: Body) -> int:
 
 
 def energy_metrics(flows: Sequence[LiquidFlow]) -> Metrics:
-    """Return the metrics of the energy budget: losses by cause over the initial energy, and the imbalance.
+    """Return the metrics of the energy budget, name -> (value, unit): losses by cause, imbalance, sliding speed.
 
-    Losses of all bodies are added. The result is empty for schemes without a budget, that is all but ispg. It includes
-    the sliding speed [m/s], since a body may slide on smooth walls for ever.
+    Losses and imbalance are over the initial energy; a body may slide on smooth walls for ever.
+
+    Args:
+        flows: Flows of all bodies, whose losses are added. Only the scheme ispg has a budget; without one the result is
+            empty.
     """
     moved = [(flow, flow.solver.state, flow.solver.first_energy) for flow in flows if isinstance(flow.solver, IspgStep)]
     started = [(flow, state, first) for flow, state, first in moved if state is not None]
@@ -337,58 +385,3 @@ def energy_metrics(flows: Sequence[LiquidFlow]) -> Metrics:
     metrics: Metrics = {f"{entry.name}_loss": (getattr(lost, entry.name) / first, "") for entry in fields(lost)}
     slides = max(float(np.linalg.norm(state.volumes @ state.velocity)) / state.volumes.sum() for _, state, _ in started)
     return metrics | {"energy_imbalance": ((now + lost.total) / first - 1.0, ""), "slide_speed": (slides, "m/s")}
-
-
-def width_change_bound(geometry: JointGeometry) -> float:
-    """Return a bound on the relative change of a joint's width by offset and tilt of the package, at equal gap.
-
-    By symmetry the change is of second order. The factors bound barrels and hourglasses of equal discs, 1.2 to 2.1
-    radii apart, to 0.3 radii and 5 deg; widths of Surface Evolver keep to them (test_particles_leaning_joints.py).
-    """
-    radius = min(geometry.radius_board, geometry.radius_package)
-    lean = float(np.hypot(*geometry.offset)) / radius + TILT_LEVER * float(np.hypot(*geometry.tilt))
-    return WIDTH_CHANGE * lean**2
-
-
-def reference_meridian(geometry: JointGeometry, solder: Solder, weight: float | None) -> Meridian | None:
-    """Return the Young-Laplace meridian of a coaxial joint with Gibbs' condition at the pad edges.
-
-    Args:
-        geometry: Gap and pad radii.
-        solder: Volume, surface tension and contact angles.
-        weight: Specific weight [N/m^3]; None if the shape is not axisymmetric.
-
-    Returns:
-        Meridian; None without a weight, if the joint is not coaxial, or if it has no equilibrium.
-    """
-    if weight is None or not geometry.is_coaxial:
-        return None
-    try:
-        return joint_meridian(
-            solder.volume,
-            geometry.radius_board,
-            geometry.radius_package,
-            geometry.gap,
-            solder.surface_tension,
-            weight,
-            angle_limits=(solder.pad_contact_angle, solder.mask_contact_angle),
-        )
-    except NoMeridian:
-        return None
-
-
-def reference_drop(solder: Solder, pad_radius: float, weight: float | None) -> Meridian | None:
-    """Return the Young-Laplace meridian of a drop on a pad in the mask, with Gibbs' condition at the pad's edge.
-
-    Args:
-        solder: Volume, surface tension and contact angles.
-        pad_radius: Radius of the pad [m], infinite for a uniform wall.
-        weight: Specific weight [N/m^3]; None if the shape is not axisymmetric.
-
-    Returns:
-        Meridian; None without a weight.
-    """
-    if weight is None:
-        return None
-    limits = (solder.pad_contact_angle, solder.mask_contact_angle)
-    return pad_meridian(solder.volume, pad_radius, solder.surface_tension, weight, angle_limits=limits)

@@ -32,7 +32,8 @@ def settle_joint(
         geometry: Initial position of the plates.
         solder: Volume, fluid, process and numerics; a floating plate makes the rigid motion soft, so that a
             ``time_step_limit`` of 100 is five times faster than one of 20.
-        motions: Motions of the plates that do not rest.
+        motions: Motion of each plate that does not rest: prescribed (``Travel``) or floating under a load
+            (``Floating``).
         progress: Function called with the fraction done, 0 to 1.
         checkpoint: File from which the run continues, to the last bit, and to which it saves its state.
 
@@ -128,12 +129,15 @@ def _broken_shape(target: LiquidJoint, broken: JointShape, flow: LiquidFlow, tim
 
 
 def travel(target: JointGeometry, flow: LiquidFlow, speed: float | None = None) -> Travel:
-    """Return the straight motion of a package to a target.
+    """Return the straight motion of a package, the second plate of a joint, from its present position to a target.
 
     Args:
         target: Geometry of the joint at the target.
         flow: Flow of the joint.
         speed: Speed of the package [m/s]; None for a fifth of a spacing in the longest time step.
+
+    Returns:
+        Motion of the plate: target position, speed [m/s] and lever of rotations [m].
     """
     if speed is None:
         speed = SPACINGS_PER_STEP * flow.body.cloud.spacing / flow.time_step.largest

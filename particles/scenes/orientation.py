@@ -55,6 +55,9 @@ def canonical(geometry: JointGeometry) -> tuple[JointGeometry, Orientation]:
     The package is then tilted about the y axis only, or offset along +x without tilt; rotated and mirrored joints share
     one canonical joint, so that it is computed once.
 
+    Args:
+        geometry: Gap, radii, offset and tilt of the joint.
+
     Returns:
         Canonical geometry, and the reflection (y to -y) and rotation about z that lead from it to the joint.
     """
@@ -82,13 +85,24 @@ def sizes(geometry: JointGeometry) -> Floats:
 
     They are the gap, the radii on board and package, the offset along x and y, and the rise of the pad's edge by the
     tilt.
+
+    Args:
+        geometry: Gap, radii, offset and tilt of a joint in canonical orientation.
     """
     discs = (geometry.gap, geometry.radius_board, geometry.radius_package)
     return np.array([*discs, *geometry.offset, geometry.tilt[1] * geometry.radius_package])
 
 
 def orient(shape: JointShape, orientation: Orientation) -> JointShape:
-    """Return the shape of a canonical joint, rotated and mirrored to an orientation; metrics and history are kept."""
+    """Return the shape of a canonical joint, rotated and mirrored to an orientation.
+
+    Args:
+        shape: Shape of the joint in canonical orientation, as ``canonical`` defines it; not changed.
+        orientation: Reflection and rotation about z, which ``canonical`` returned.
+
+    Returns:
+        Shape with transformed positions and velocities; metrics and history are equal.
+    """
     if orientation == Orientation():
         return shape
 

@@ -75,6 +75,9 @@ def write_body(folder: Path, shape: JointShape, reference: Meridian | None) -> N
 def read_body(folder: Path) -> tuple[JointShape, np.ndarray | None]:
     """Read the file ``shape.h5`` of ``write_body``.
 
+    Args:
+        folder: Folder that ``write_body`` has written.
+
     Returns:
         Shape, and radii and heights of the exact meridian, shape (2, k) [m]; None if none was written.
     """
@@ -126,11 +129,11 @@ def write_particles(path: Path | str, shape: JointShape) -> None:
 
 
 def write_flow(folder: Path, result: FlowResult) -> None:
-    """Write a flow: pictures, history and metrics without timings to ``flow.h5``, its end to ``particles.vtu``.
+    """Write a flow: pictures, history and metrics without timings to ``flow.h5``, final state to ``particles.vtu``.
 
     Args:
         folder: Existing folder; both files are replaced.
-        result: Result of the flow.
+        result: Result of the flow: pictures, history and metrics.
     """
     with h5py.File(folder / FLOW, "w") as file:
         file["walls"] = result.walls
@@ -151,7 +154,11 @@ def write_flow(folder: Path, result: FlowResult) -> None:
 
 
 def read_flow(folder: Path) -> FlowResult:
-    """Read the file ``flow.h5`` of ``write_flow`` in a folder; timings and texts are not in the file."""
+    """Read the file ``flow.h5`` that ``write_flow`` wrote into a folder.
+
+    Returns:
+        Pictures, walls, history and metrics; without timings and texts, which are not in the file.
+    """
     with h5py.File(folder / FLOW, "r") as file:
         pictures = [
             Picture(float(item.attrs["time"]), item["points"][()], item["velocity"][()], item["pressure"][()])

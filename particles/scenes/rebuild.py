@@ -46,6 +46,10 @@ def touch(first: Body, second: Body) -> bool:
     """Return whether the free surfaces of two bodies (particles with a triangulated surface) touch.
 
     They do if two of their vertices are within about the smaller particle spacing of each other.
+
+    Args:
+        first: One body, not changed.
+        second: Another body, not changed.
     """
     reach = CONTACT_SPACINGS * min(first.cloud.spacing, second.cloud.spacing)
     surfaces = [body.points[: body.cloud.surface_count] for body in (first, second)]
@@ -54,7 +58,14 @@ def touch(first: Body, second: Body) -> bool:
 
 
 def overlap(first: Body, second: Body) -> float:
-    """Return the largest depth of particles of the second body inside the first [m]; negative if all are outside."""
+    """Return the largest depth of particles of the second body below the surface of the first [m].
+
+    It is negative if all of them are outside.
+
+    Args:
+        first: Body with a triangulated surface, not changed.
+        second: Body whose particles are tested, not changed.
+    """
     return float(measure_depths(second.points, *closed_surface(first)).max())
 
 
@@ -62,6 +73,9 @@ def collapsing(body: Body) -> bool:
     """Return whether triangles of a body have collapsed to slivers, or its contact lines meet.
 
     Slivers have an edge that is short in relation to the particle spacing, or a poor ratio of area to edges.
+
+    Args:
+        body: Liquid body: particles, triangles of its free surface, and contact lines.
     """
     corner = body.points[body.triangles]
     square = ((corner - np.roll(corner, 1, axis=1)) ** 2).sum(axis=2)
@@ -122,9 +136,9 @@ def _put_centre(body: Body, walls: Sequence[Plate], centre: Floats) -> None:
 
 
 def hand_over(old: Sequence[LiquidFlow], new: Sequence[LiquidFlow]) -> None:
-    """Transfer time and steps from old flows to those of remeshed bodies, the latest of each.
+    """Set time and number of steps of the flows of remeshed bodies to the largest of the old flows.
 
-    With the scheme ispg, motion, centre and energy budget are transferred, too.
+    With the scheme ispg, velocities, centre of mass and energy budget are transferred, too.
 
     Args:
         old: Flows of the bodies before remeshing; not changed.
@@ -156,6 +170,9 @@ def closed_surface(body: Body) -> tuple[Floats, Indices]:
     """Return the closed surface of a body and its mirror image behind each wall.
 
     The image closes a body on one wall; between two walls, lids far behind the walls close it.
+
+    Args:
+        body: Liquid body: particles, triangles of its free surface, and contact lines.
 
     Returns:
         Points, shape (n, 3) [m], and triangles, shape (t, 3).
@@ -215,7 +232,8 @@ def split_to_rest(flow: LiquidFlow, rule: StopRule, start: Callable[[Body], Liqu
 
     Args:
         flow: Flow of the body, with one contact line on each plate.
-        rule: Rule that ends the flow of a drop.
+        rule: Criteria by which the flow of a drop ends: tolerance and duration of rest, number of steps, end of the
+            process.
         start: Function of a body that returns the flow of a drop.
 
     Returns:

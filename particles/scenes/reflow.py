@@ -150,8 +150,8 @@ def collect_shape(solder: Solder, flow: LiquidFlow, run: Run, metrics: Metrics) 
 
     Args:
         solder: Fluid properties.
-        flow: Flow at the end of the run.
-        run: Records of the steps.
+        flow: Flow at the end of the run: body, physics and time.
+        run: Steps of the run: a record and a profile of each, and snapshots.
         metrics: Metrics of the shape.
     """
     body = flow.body.whole()

@@ -22,7 +22,7 @@ def start_section(drop: Drop, solder: Solder, effects: dict[str, bool]) -> Secti
     Args:
         drop: Drop with the kind of its section, plane or axisymmetric, and its resolution.
         solder: Fluid and numerics.
-        effects: Name -> on or off; missing effects are off.
+        effects: Name of an effect, such as "inertia" -> on or off; missing effects are off.
 
     Returns:
         Flow at time 0, whose free surface is a polyline in the plane of the section.

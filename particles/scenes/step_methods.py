@@ -40,7 +40,11 @@ class StepMethod:
 
 
 def has_motion(effects: Mapping[str, bool]) -> bool:
-    """Return whether inertia or viscosity acts, which have no effect at rest; name -> on or off."""
+    """Return whether inertia or viscosity acts, which have no effect at rest.
+
+    Args:
+        effects: Name of an effect -> on or off; missing effects are off.
+    """
     return any(effects.get(name, False) for name in AT_REST)
 
 
@@ -63,7 +67,7 @@ def step_method(solder: Solder, effects: Mapping[str, bool]) -> StepMethod:
 
     Args:
         solder: Solder with the selected scheme.
-        effects: Name -> on or off; missing effects are off.
+        effects: Name of an effect, such as "inertia" -> on or off; missing effects are off.
 
     Returns:
         Method with its name and the functions that build its step solver and its events.
@@ -76,8 +80,11 @@ def start_solver(solder: Solder, effects: Mapping[str, bool], physics: Physics) 
 
     Args:
         solder: Fluid and numerics, with the selected scheme.
-        effects: Name -> on or off; missing effects are off.
+        effects: Name of an effect, such as "inertia" -> on or off; missing effects are off.
         physics: Physics of the active effects; not changed.
+
+    Returns:
+        Step solver before its first step, and the physics with the added events.
     """
     method = step_method(solder, effects)
     solver = method.build(solder)

@@ -130,7 +130,10 @@ class Section(Body):
 
 
 def as_section(body: Body) -> Section:
-    """Return the body as a section.
+    """Return a body unchanged, typed as a two-dimensional body in section.
+
+    Args:
+        body: Liquid body, which must be a ``Section``: a drop whose free surface is a polyline in the plane y = 0.
 
     Raises:
         TypeError: The body is not a section.
@@ -168,13 +171,13 @@ def rotate_copies(angles: Floats) -> Placements:
 
 
 def translate_copies(depth: float) -> Placements:
-    """Return two copies a depth [m] apart along y, on either side of the section."""
+    """Return the placements of two copies of a plane section, half of ``depth`` [m] to either side of it along y."""
     shifts = depth * np.array([[0.0, -0.5, 0.0], [0.0, 0.5, 0.0]])
     return Placements(np.broadcast_to(np.eye(3), (2, 3, 3)), shifts)
 
 
 def fill_block(polyline: Polyline, width: float, height: float, count: int) -> Cloud:
-    """Return a rectangular lattice of particles on the wall z = 0.
+    """Return the cloud of a rectangle: a lattice of particles in the plane y = 0 on the wall z = 0.
 
     The first particles below the surface are half a spacing off the axis: each has a pressure that keeps its volume,
     and on the axis only one velocity component, so that a column of them would lock.
@@ -184,6 +187,9 @@ def fill_block(polyline: Polyline, width: float, height: float, count: int) -> C
         width: Half width [m].
         height: Height [m].
         count: Number of particles along the height.
+
+    Returns:
+        Particles, with the vertices of the surface as polyline segments and the contact points on the wall.
     """
     last = count - 1
     across = max(3, round(width / height * last))
@@ -205,12 +211,15 @@ def fill_block(polyline: Polyline, width: float, height: float, count: int) -> C
 
 
 def fill_disc(polyline: Polyline, radius: float, rings: int) -> Cloud:
-    """Return concentric circles of particles without a wall; half circles without particles on the axis for a meridian.
+    """Return the cloud of a free disc: concentric circles of particles, half circles off the axis for a meridian.
 
     Args:
         polyline: Meridian, or closed section of a plane drop.
         radius: Radius of the outer circle [m].
         rings: Number of circles.
+
+    Returns:
+        Particles, with the vertices of the surface as polyline segments; without contact points.
     """
     shells = []
     for ring in range(rings, 0, -1):

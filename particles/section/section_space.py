@@ -241,7 +241,7 @@ def section_volumes(body: Section, density: Floats) -> Floats:
     About an axis the moments of x and x z vanish for the whole body.
 
     Args:
-        body: Liquid body.
+        body: Liquid body: particles, triangles of its free surface, and plates.
         density: Particle density at each particle, with walls mirrored and the free surface counted by ``cell_share``,
             shape (n,).
 

@@ -138,9 +138,12 @@ class PreparedSectionStep(PreparedIspgStep):
 
 
 def admissible_basis(body: Body) -> sparse.csr_matrix:
-    """Return a basis of the velocities within the plane, along walls and along the axis, as columns, shape (3 n, d).
+    """Return a basis of velocities in the plane of a section that walls and axis admit, as columns, shape (3 n, d).
 
     Rows are ordered by particle; d is the number of degrees of freedom.
+
+    Args:
+        body: Drop in section, with n particles, its walls and its axis.
     """
     free = np.ones((len(body.points), 3), bool)
     free[:, 1] = False

@@ -122,11 +122,12 @@ def contact_cosines(lowest: float, highest: float, outward: Floats, push: Floats
 
 
 def divide_by_sliding_velocity(velocities: Floats, tension: float, law: Law) -> Floats:
-    """Return velocities along the wall over the velocity from which on a contact line slides, shape (m, 2).
+    """Return the components of velocities along the wall z = 0, divided by the sliding velocity, shape (m, 2).
 
-    The sliding velocity is gamma / (rho h c). At it friction would stop the mass of a support, rho h^2 a unit of
-    length, while sound crosses the support: a time step of a quarter of that takes a third of the velocity, and more
-    than all of it would be unstable. So the sliding velocity depends on the spacing and on the speed of sound.
+    From the sliding velocity on, gamma / (rho h c), a contact line slides. At it friction would stop the mass of a
+    support, rho h^2 a unit of length, while sound crosses the support: a time step of a quarter of that takes a third
+    of the velocity, and more than all of it would be unstable. So the sliding velocity depends on the spacing and on
+    the speed of sound.
 
     Args:
         velocities: Velocities of the vertices, shape (m, 3) [m/s].

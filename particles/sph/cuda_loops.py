@@ -70,7 +70,7 @@ def loops_of(law: Law) -> Loops:
     """Compile the kernels of a law; its numbers are constants in them, so terms that do not act vanish.
 
     Args:
-        law: Parameters of the pair interactions.
+        law: Parameters of the pair interactions, such as kernel, smoothing length and density.
 
     Returns:
         Nine CUDA kernels, each a loop over particles: steps of the motion (predict, settle, correct, take_slopes,

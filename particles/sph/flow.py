@@ -84,7 +84,7 @@ def run_flow(
     """Run a simulation to a final time with about 2000 rows of history and 24 pictures (snapshots of the particles).
 
     Args:
-        simulation: Simulation in its initial state; advanced in place.
+        simulation: Particles, their surface if it is tracked, and time, in the initial state; advanced in place.
         until: Final time [s].
         sample: Function of the simulation that returns a row of the history, the time [s] first.
         progress: Function called after each step with the completed fraction, 0 to 1; None for no call.
@@ -138,6 +138,9 @@ def device_of(scene: FlowScene) -> Callable[[Fields, int, Law], Particles]:
     The class takes the initial ``Fields``, the number of liquid particles and the ``Law``; its objects move the
     particles in parallel on threads, or on a GPU if the numerical parameters of the scene name the device "cuda".
 
+    Args:
+        scene: Parameters of the flow, whose numerics name the device, "cpu" or "cuda".
+
     Raises:
         NoDeviceError: The machine has no CUDA device.
     """
@@ -152,10 +155,13 @@ def law_of(scene: FlowScene, periods: Vector, gravity: Vector, has_surface: bool
     """Return the parameters of the pair interactions of a flow in the plane of x and z.
 
     Args:
-        scene: Parameters of the flow.
+        scene: Parameters of the flow: liquid, sizes, effects and numerics.
         periods: Periods along x, y and z [m]; 0 if not periodic.
         gravity: Gravity along x, y and z [m/s^2].
         has_surface: Whether the liquid has a free surface, near which particles cannot be shifted.
+
+    Returns:
+        Kernel, smoothing length, density, speed of sound, viscosity and the other constants of the pairs.
     """
     numerics, spacing, sound = sph_numerics(scene), scene.spacing, sph_sound(scene)
     length, kernel = numerics.smoothing_length * spacing, KERNELS[numerics.kernel]
@@ -188,11 +194,14 @@ def law_of(scene: FlowScene, periods: Vector, gravity: Vector, has_surface: bool
 
 
 def shear_law(scene: FlowScene) -> dict[str, Any]:
-    """Return the entries of ``Law`` for a shear-dependent viscosity, neutral ones without it.
+    """Return the parameters of a shear-dependent viscosity, by their names in ``Law``; neutral ones without it.
+
+    Args:
+        scene: Parameters of the flow, with its rheology (None without shear dependence) and viscosity.
 
     Returns:
         Dict of ``rheology`` (number of the viscosity law), ``exponent``, ``shear_rate`` [1/s], ``least_viscosity`` and
-            ``most_viscosity`` [Pa s].
+        ``most_viscosity`` [Pa s].
     """
     rheology = scene.rheology
     if rheology is None or not decide_flow(scene)["shear_dependent_viscosity"]["on"]:
@@ -207,10 +216,10 @@ def shear_law(scene: FlowScene) -> dict[str, Any]:
 
 
 def law_in_space(law: Law, spacing: float, mirror: bool, no_slip: bool) -> Law:
-    """Return the law of the same flow in space.
+    """Return the parameters of the pair interactions of the same flow in three dimensions.
 
     Args:
-        law: Law of a flow in a plane.
+        law: Parameters of the pair interactions of a flow in a plane.
         spacing: Particle spacing in space [m].
         mirror: Whether the plane z = 0 is a wall with mirror images.
         no_slip: Whether walls act on the liquid by viscosity.
@@ -223,18 +232,22 @@ def law_in_space(law: Law, spacing: float, mirror: bool, no_slip: bool) -> Law:
 
 
 def wall_layers(scene: FlowScene) -> int:
-    """Return the number of layers of wall particles that fill the support of liquid near a wall."""
+    """Return the number of layers of wall particles that fill the kernel support of liquid near a wall.
+
+    Args:
+        scene: Parameters of a flow by delta-SPH, whose smoothing length over the spacing decides.
+    """
     return int(np.ceil(SUPPORT * sph_numerics(scene).smoothing_length))
 
 
 def make_fields(liquid: Floats, walls: Floats, pressure: Floats, law: Law) -> Fields:
-    """Return the initial fields of liquid and walls at rest.
+    """Return the initial fields (positions, velocities, densities, pressures, masses, ...) of liquid and walls at rest.
 
     Args:
         liquid: Positions of the liquid particles, shape (3, n) [m].
         walls: Positions of the wall particles, shape (3, m) [m].
         pressure: Pressures of the liquid particles, shape (n,) [Pa].
-        law: Parameters of the pair interactions.
+        law: Parameters of the pair interactions, such as kernel, smoothing length and density.
     """
     points = np.concatenate((liquid, walls), axis=1)
     count, fixed = points.shape[1], walls.shape[1]
@@ -254,10 +267,13 @@ def result_of(run: FlowRun, history: dict[str, Floats], metrics: Metrics) -> Flo
     """Return the result of a run, with the metrics that all flows share added to its own.
 
     Args:
-        run: Finished run.
+        run: Finished run: final simulation, pictures and wall time.
         history: Column name -> samples over time, shape (n,).
         metrics: Metric name -> (value, unit) of this kind of flow. Added are ``volume_drift`` (relative change of
             volume), ``particles``, ``steps``, ``particle_steps_per_second`` [1/s] and ``seconds`` (wall time) [s].
+
+    Returns:
+        Pictures, wall particles, history and all metrics.
     """
     simulation = run.simulation
     fluids, fields = simulation.fluids, simulation.fields

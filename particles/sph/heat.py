@@ -18,7 +18,7 @@ from reflowshock.particles.flows.freezing import Freezing
 from reflowshock.particles.flows.sph_numerics import DIFFUSIVE
 from reflowshock.particles.sph import pair_terms
 from reflowshock.particles.sph.fluid_state import Fields, Law
-from reflowshock.particles.sph.particle_rates import apart, constants_of, periods_of, summed
+from reflowshock.particles.sph.particle_pairs import apart, constants_of, periods_of, summed
 from reflowshock.particles.sph.smoothing import slope
 from reflowshock.particles.sph.threads import Rows
 
@@ -33,9 +33,9 @@ def temperature_laplacian(i, neighbours, fields, temperatures, law):
     Args:
         i: Number of the particle, integer.
         neighbours: Numbers of its neighbours, shape (k,), which include itself because of its image.
-        fields: ``Fields`` of all particles.
+        fields: ``Fields``: arrays of position, velocity, density, pressure and mass of all particles, liquid first.
         temperatures: Temperatures of all particles, row 0, and of their mirror images, row 1, shape (2, n) [K].
-        law: ``Law`` of the particles.
+        law: ``Law``: constants of the particles, such as kernel, smoothing length, density and speed of sound.
     """
     x, y, z, temperature = fields.x[i], fields.y[i], fields.z[i], temperatures[0, i]
     periods, (line, inverse, scale, softening, _) = periods_of(law), constants_of(law)
@@ -106,5 +106,10 @@ class Heat:
 
 
 def enthalpy_at(freezing: Freezing, temperature: float) -> float:
-    """Return the specific enthalpy [J/kg] at a temperature [K]; at the melting point, of the liquid."""
+    """Return the specific enthalpy of an ink at a temperature, 0 for the solid at the melting point [J/kg].
+
+    Args:
+        freezing: Melting point, latent heat and heat capacity of the ink.
+        temperature: Temperature [K]; the melting point counts as liquid.
+    """
     return float(enthalpy.enthalpy(temperature, freezing.melting_point, freezing.heat_capacity, freezing.latent_heat))

@@ -4,20 +4,21 @@ The array ``middle``, shape (7, n), has the velocity u + a dt / 2 and the densit
 step; its last three rows are the velocities that XSPH adds when it moves particles [m/s].
 """
 
-from reflowshock.particles.sph.particle_rates import compiled
+from reflowshock.particles.sph.particle_pairs import compiled
 
 
 @compiled
 def predict(i, fields, rates, middle, time_step):
-    """Move a particle over a time step and predict its velocity and density from the last rates.
+    """Move a particle over a time step, and predict its velocity and density at the end of it from the last rates.
 
     Args:
         i: Number of the particle, integer.
-        fields: ``Fields`` of all particles.
+        fields: ``Fields``: arrays of position, velocity, density, pressure and mass of all particles, liquid first.
         rates: Rates, shape (10, n): density rate [kg/(m^3 s)], acceleration (3) [m/s^2], density gradient (3) [kg/m^4],
             concentration gradient (3) [1/m].
-        middle: Values in the middle of the step, shape (7, n); velocity (3) [m/s] and density [kg/m^3] are written to
-            the first four rows.
+        middle: Work array, shape (7, n), changed in place: velocity (3) [m/s] and density [kg/m^3] in the middle of the
+            step are written to its first four rows; its last three rows, the additional velocity of XSPH [m/s], are
+            read.
         time_step: Time step, scalar [s].
     """
     half = 0.5 * time_step
@@ -39,9 +40,11 @@ def settle(i, fields, middle, law):
 
     Args:
         i: Number of the particle, integer.
-        fields: ``Fields`` of all particles; those of particle i change.
-        middle: Values in the middle of the step, shape (7, n), whose velocity along z, row 2, is reflected, too.
-        law: ``Law`` of the particles.
+        fields: ``Fields``: arrays of position, velocity, density, pressure and mass of all particles; the values of
+            particle i change in place.
+        middle: Work array, shape (7, n); its row 2, the velocity along z in the middle of the step [m/s], changes sign
+            with the particle.
+        law: ``Law``: constants of the particles, such as kernel, smoothing length, density and speed of sound.
     """
     middle[2, i] *= reflect(i, fields, law)
     fields.pressure[i] = law.sound * law.sound * (fields.density[i] - law.rest_density)
@@ -55,8 +58,10 @@ def reflect(i, fields, law):
 
     Args:
         i: Number of the particle, integer.
-        fields: ``Fields`` of all particles; position, velocity and density gradient along z may change sign.
-        law: ``Law`` of the particles; without a mirror nothing changes.
+        fields: ``Fields``: arrays of the values of all particles; position, velocity and density gradient along z of
+            particle i may change sign, in place.
+        law: ``Law``: constants of the particles, of which ``mirror`` (0 or 1) is used; without a mirror nothing
+            changes.
     """
     side = -1.0 if law.mirror and fields.z[i] < 0.0 else 1.0
     fields.z[i] *= side
@@ -67,14 +72,16 @@ def reflect(i, fields, law):
 
 @compiled
 def correct(i, fields, rates, middle, time_step):
-    """Complete the time step of a particle with the rates at its end and store the density gradient.
+    """Complete the time step of a particle: recompute velocity and density with the rates at its end.
 
     Args:
         i: Number of the particle, integer.
-        fields: ``Fields`` of all particles; velocity, density and density gradient of particle i change.
+        fields: ``Fields``: arrays of the values of all particles; velocity, density and density gradient (taken from
+            the rates) of particle i change in place.
         rates: Rates, shape (10, n): density rate [kg/(m^3 s)], acceleration (3) [m/s^2], density gradient (3) [kg/m^4],
             concentration gradient (3) [1/m].
-        middle: Velocity (3) and density in the middle of the step in the first four rows, shape (7, n).
+        middle: Work array, shape (7, n); its first four rows, velocity (3) [m/s] and density [kg/m^3] in the middle of
+            the step, are read.
         time_step: Time step, scalar [s].
     """
     half = 0.5 * time_step
@@ -91,7 +98,7 @@ def take_slope(i, fields, rates):
 
     Args:
         i: Number of the particle, integer.
-        fields: ``Fields`` of all particles; the density gradient of particle i changes.
+        fields: ``Fields``: arrays of the values of all particles; the density gradient of particle i is set, in place.
         rates: Rates, shape (10, n): density rate [kg/(m^3 s)], acceleration (3) [m/s^2], density gradient (3) [kg/m^4],
             concentration gradient (3) [1/m]; rows 4 to 6 are used.
     """
@@ -104,11 +111,11 @@ def shift(i, fields, rates, factor, law):
 
     Args:
         i: Number of the particle, integer.
-        fields: ``Fields`` of all particles; the position of particle i changes.
+        fields: ``Fields``: arrays of the values of all particles; the position of particle i changes in place.
         rates: Rates, shape (10, n): density rate [kg/(m^3 s)], acceleration (3) [m/s^2], density gradient (3) [kg/m^4],
             concentration gradient (3) [1/m]; rows 7 to 9 are used.
         factor: Factor of the gradient, a scalar [m^2].
-        law: ``Law`` of the particles.
+        law: ``Law``: constants of the particles, such as kernel, smoothing length, density and speed of sound.
     """
     fields.x[i] -= factor * rates[7, i]
     fields.y[i] -= factor * rates[8, i]
@@ -118,20 +125,25 @@ def shift(i, fields, rates, factor, law):
 
 @compiled
 def speed2_of(i, fields):
-    """Return the squared speed of particle ``i``, an integer, in its ``Fields``; a scalar [m^2/s^2]."""
+    """Return the squared speed of a particle, a scalar [m^2/s^2].
+
+    Args:
+        i: Number of the particle, integer.
+        fields: ``Fields``: arrays of the values of all particles, of which the velocities u, v, w are read.
+    """
     return fields.u[i] * fields.u[i] + fields.v[i] * fields.v[i] + fields.w[i] * fields.w[i]
 
 
 @compiled
 def cover(k, i, fields, found, law):
-    """Write the values of a wall particle to the fields; its density follows from its pressure.
+    """Write pressure, velocity and weight of a wall particle to the fields; its density follows from its pressure.
 
     Args:
-        k: Number among the wall particles, integer.
-        i: Number among all particles, integer.
-        fields: ``Fields`` of all particles; changed in place.
+        k: Number of the wall particle among the wall particles, integer.
+        i: Its number among all particles, integer.
+        fields: ``Fields``: arrays of the values of all particles; those of the wall particle change in place.
         found: Pressure [Pa], velocity along x, y, z [m/s] and weight (0 to 1) of the particle, a tuple of five scalars.
-        law: ``Law`` of the particles.
+        law: ``Law``: constants of the particles, such as kernel, smoothing length, density and speed of sound.
     """
     pressure, u, v, w, share = found
     fields.pressure[i], fields.u[i], fields.v[i], fields.w[i], fields.wall_share[k] = pressure, u, v, w, share

@@ -4,101 +4,40 @@ The order of a sum does not depend on the number of threads. Indices are unsigne
 would count from the end.
 """
 
-from math import floor, inf, sqrt
+from math import inf, sqrt
 
-from numba import njit, uint32
+from numba import uint32
 
 from reflowshock.particles.sph import pair_terms
 from reflowshock.particles.sph.fluid_state import REPRODUCING
+from reflowshock.particles.sph.particle_pairs import (
+    apart,
+    compiled,
+    constants_of,
+    liquid_among,
+    periods_of,
+    positive,
+    summed,
+)
 from reflowshock.particles.sph.smoothing import shape, slope
 
 # Least determinant of the matrix of moments, which is one inside the liquid, for a resolved gradient.
 FEWEST_MOMENTS = 0.05
 # Largest condition number of the linear fit, and number of neighbours that it must exceed; otherwise the slope is zero.
 LARGEST_CONDITION, FEWEST_NEIGHBOURS = 1e3, 5
-# Functions without arrays of their own need no reference counts, which cost a tenth of a step and made threads wait.
-compiled = njit(cache=True, error_model="numpy", _nrt=False)
-# Sums may be reordered by the compiler, so that several pairs are computed at a time; threads do not change the order.
-# The order follows the names of the variables: renaming one changes the last bits of results.
-summed = njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"}, _nrt=False)
-
-
-@compiled
-def periods_of(law):
-    """Return three pairs (period [m], 1 / period [1/m]) of a ``Law``, for x, y and z; (0, 0) if not periodic."""
-    x, y, z = law.period_x, law.period_y, law.period_z
-    return (x, 1.0 / x if x > 0.0 else 0.0), (y, 1.0 / y if y > 0.0 else 0.0), (z, 1.0 / z if z > 0.0 else 0.0)
-
-
-@compiled
-def constants_of(law):
-    """Return five constants of all pairs from a ``Law``, a tuple.
-
-    These are: whether the flow has one dimension, 1 / h [1/m], the factor sigma / h^2 of the kernel gradient, the
-    softening 0.01 h^2 of viscosity [m^2], and sigma over W at one spacing.
-    """
-    line, inverse = law.dimension == 1, 1.0 / law.length
-    scale, softening = law.norm * inverse * inverse, pair_terms.SOFTENING * law.length * law.length
-    return line, inverse, scale, softening, 1.0 / shape(law.kernel, line, law.spacing * inverse)
-
-
-@compiled
-def across(distance, period):
-    """Return a component of the vector between two particles [m] for the nearest periodic image.
-
-    ``distance`` is the difference of their coordinates, a scalar [m]; ``period`` the pair (period [m], 1 / period
-    [1/m]), (0, 0) if not periodic.
-    """
-    return distance - period[0] * floor(distance * period[1] + 0.5)
-
-
-@compiled
-def apart(place, j, side, fields, periods):
-    """Return the vector (x, y, z) from a particle, or from its mirror image, to a position [m].
-
-    Args:
-        place: Position (x, y, z) [m].
-        j: Number of the particle, integer.
-        side: 1 for the particle, -1 for its image behind the plane z = 0.
-        fields: ``Fields`` of all particles.
-        periods: Pairs (period [m], 1 / period [1/m]) for x, y and z, (0, 0) if not periodic.
-    """
-    dx = across(place[0] - fields.x[j], periods[0])
-    dy = across(place[1] - fields.y[j], periods[1])
-    return dx, dy, across(place[2] - side * fields.z[j], periods[2])
-
-
-@compiled
-def positive(value):
-    """Return a value, or zero if it is negative or not a number; Numba 0.68 cannot compile ``max`` for a GPU."""
-    return value if value > 0.0 else 0.0
-
-
-@compiled
-def liquid_among(neighbours, fluids):
-    """Return the number of liquid particles in a row, in which they come first, by bisection.
-
-    ``neighbours (k,)`` has their numbers; those below the integer ``fluids`` are liquid.
-    """
-    first, last = 0, len(neighbours)
-    while first < last:
-        middle = (first + last) // 2
-        if neighbours[middle] < fluids:
-            first = middle + 1
-        else:
-            last = middle
-    return first
 
 
 @compiled
 def closing_in(k, velocity, d, fields):
-    """Return (u_i - u_j) . d for a wall particle, doubled for weighted ones, which act as mirror images [m^2/s].
+    """Return (u_i - u_j) . d of a liquid and a wall particle, a scalar [m^2/s].
+
+    It is doubled for wall particles with a weight, which act as mirror images.
 
     Args:
-        k: Number among the wall particles, integer.
-        velocity: Velocity u_i (x, y, z) [m/s].
-        d: Vector (x, y, z) from the wall particle to i [m].
-        fields: ``Fields`` of all particles.
+        k: Number of the wall particle j among the wall particles, integer.
+        velocity: Velocity u_i (x, y, z) of a liquid particle i [m/s].
+        d: Vector (x, y, z) from the wall particle to particle i [m].
+        fields: ``Fields``: arrays of position, velocity, density, pressure and mass of all particles, liquid first.
     """
     u, v, w = velocity[0] - fields.wall_u[k], velocity[1] - fields.wall_v[k], velocity[2] - fields.wall_w[k]
     closing = u * d[0] + v * d[1] + w * d[2]
@@ -107,19 +46,30 @@ def closing_in(k, velocity, d, fields):
 
 @compiled
 def pulls_not(law):
-    """Return whether walls exert no tension on liquid, as a boolean: if the ``Law`` has an untracked free surface."""
+    """Return whether walls cannot pull at the liquid, a boolean: if it has a free surface that is not tracked.
+
+    Args:
+        law: ``Law``: constants of the particles, of which ``has_surface`` and ``tracked`` (0 or 1) are read.
+    """
     return law.has_surface and not law.tracked
 
 
 @compiled
 def own_viscosity(i, fields, law):
-    """Return the viscosity of particle ``i`` of ``Fields`` [Pa s], a scalar; 0 if viscosity does not act."""
+    """Return the viscosity of one particle, a scalar [Pa s]; 0 if viscosity does not act.
+
+    Args:
+        i: Number of the particle, integer.
+        fields: ``Fields``: arrays of the values of all particles; ``viscosity`` is read if it depends on the shear
+            rate.
+        law: ``Law``: constants of the particles, with the constant viscosity and the number of the viscosity law.
+    """
     return positive(fields.viscosity[i] if law.rheology else law.viscosity)
 
 
 @compiled
 def rates_of(i, fluids, neighbours, fields, law):
-    """Return the rates of a liquid particle from its neighbours.
+    """Return the rates of density and velocity of a liquid particle, and two gradients, from its neighbours.
 
     A particle is in its own row because of its mirror image; the pair with itself contributes nothing.
 
@@ -127,12 +77,12 @@ def rates_of(i, fluids, neighbours, fields, law):
         i: Number of the particle, integer.
         fluids: Number of liquid particles, integer.
         neighbours: Numbers of its neighbours, liquid ones first, shape (k,).
-        fields: ``Fields`` of all particles.
-        law: ``Law`` of the particles.
+        fields: ``Fields``: arrays of position, velocity, density, pressure and mass of all particles, liquid first.
+        law: ``Law``: constants of the particles, such as kernel, smoothing length, density and speed of sound.
 
     Returns:
-        Rate of density [kg/(m^3 s)], acceleration (3) [m/s^2], density gradient (3) [kg/m^4], gradient of the
-        concentration of particles (3) [1/m].
+        Tuple of ten scalars: rate of density [kg/(m^3 s)], acceleration (3) [m/s^2], density gradient (3) [kg/m^4],
+        gradient of the concentration of particles (3) [1/m].
     """
     liquid = liquid_among(neighbours, fluids)
     rate, ax, ay, az, cx, cy, cz, bx, by, bz, xx, yy, zz, xy, yz, xz = _by_liquid(i, neighbours[:liquid], fields, law)
@@ -239,10 +189,16 @@ def _by_walls(i, fluids, neighbours, fields, law):
 
 @summed
 def drift_of(i, fluids, neighbours, fields, law):
-    """Return the velocity (x, y, z) [m/s] that XSPH adds when it moves a liquid particle; momentum does not change.
+    """Return the velocity (x, y, z) that XSPH adds when it moves a liquid particle, three scalars [m/s].
 
-    ``i`` is the particle, ``fluids`` the number of liquid particles (integers), ``neighbours (k,)`` its neighbours,
-    liquid ones first, ``fields`` and ``law`` the ``Fields`` and ``Law`` of all particles.
+    It smooths the motion towards the mean velocity of the neighbours; momentum does not change.
+
+    Args:
+        i: Number of the particle, integer.
+        fluids: Number of liquid particles, integer.
+        neighbours: Numbers of its neighbours, liquid ones first, shape (k,).
+        fields: ``Fields``: arrays of position, velocity, density, pressure and mass of all particles, liquid first.
+        law: ``Law``: constants of the particles, such as kernel, smoothing length and the factor of XSPH.
     """
     x, y, z, u, v, w = fields.x[i], fields.y[i], fields.z[i], fields.u[i], fields.v[i], fields.w[i]
     periods = periods_of(law)
@@ -263,12 +219,15 @@ def drift_of(i, fluids, neighbours, fields, law):
 
 @compiled
 def solved(moments, sums, dimension):
-    """Return the gradient (x, y, z) ``moments^-1 sums``, in a plane with x and z only; zero if not resolved.
+    """Solve ``moments gradient = sums`` for a gradient, three scalars (x, y, z); zero if it is not resolved.
+
+    In a plane only the x and z components are solved; y is zero.
 
     Args:
-        moments: Entries xx, yy, zz, xy, yz and xz of a symmetric matrix, six scalars.
-        sums: Right-hand side (x, y, z), three scalars.
-        dimension: Dimension of the flow, 1 (along x), 2 (x and z) or 3.
+        moments: Entries xx, yy, zz, xy, yz and xz of a dimensionless symmetric matrix, about the identity inside the
+            liquid; a tuple of six scalars.
+        sums: Right-hand side (x, y, z), a tuple of three scalars in the unit of the gradient.
+        dimension: Dimension of the flow, integer: 1 (along x), 2 (x and z) or 3.
     """
     xx, yy, zz, xy, yz, xz = moments
     bx, by, bz = sums
@@ -293,11 +252,16 @@ def solved(moments, sums, dimension):
 
 @summed
 def fitted_slope(i, neighbours, fields, law):
-    """Return the slope (x, y, z) of the linear least-squares fit to the densities of a particle's neighbours [kg/m^4].
+    """Return the density gradient at a particle by a linear least-squares fit, three scalars (x, y, z) [kg/m^4].
 
     With the weights W V it solves the 4 x 4 system of Belytschko et al. (1998), with the first row eliminated. It is
-    zero if neighbours do not resolve it (Shepard interpolation). ``i`` is the particle, an integer; ``neighbours (k,)``
-    are its liquid neighbours, ``fields`` and ``law`` the ``Fields`` and ``Law`` of all particles.
+    zero if the neighbours do not resolve it (Shepard interpolation).
+
+    Args:
+        i: Number of the particle, integer.
+        neighbours: Numbers of its liquid neighbours, shape (k,).
+        fields: ``Fields``: arrays of position, velocity, density, pressure and mass of all particles, liquid first.
+        law: ``Law``: constants of the particles, such as kernel, smoothing length, density and speed of sound.
     """
     x, y, z, density = fields.x[i], fields.y[i], fields.z[i], fields.density[i]
     periods, inverse = periods_of(law), 1.0 / law.length
@@ -332,10 +296,13 @@ def fitted_slope(i, neighbours, fields, law):
 
 @compiled
 def condition_of(moments, dimension):
-    """Return an upper bound of the condition number of a symmetric matrix; infinite if singular.
+    """Return an upper bound of the condition number of a symmetric 3 x 3 matrix, a scalar; infinite if it is singular.
 
-    The largest eigenvalue is at most the trace, and the middle one at most half of it. In a plane only x and z count.
-    ``moments`` are its entries xx, yy, zz, xy, yz, xz; ``dimension`` counts those of the flow, 1 to 3.
+    The largest eigenvalue is at most the trace, and the middle one at most half of it.
+
+    Args:
+        moments: Entries xx, yy, zz, xy, yz and xz of the matrix, a tuple of six scalars.
+        dimension: Dimension of the flow, integer: 1 for xx only, 2 for x and z, 3 for the whole matrix.
     """
     xx, yy, zz, xy, yz, xz = moments
     if dimension == 1:
@@ -349,14 +316,21 @@ def condition_of(moments, dimension):
 
 @summed
 def wall_values(i, fluids, neighbours, fields, law):
-    """Return pressure [Pa], velocity (3) [m/s] and weight of a wall particle from the liquid near it.
+    """Return pressure, velocity and weight of a wall particle from the liquid near it.
 
     The pressure is extrapolated from the liquid with its hydrostatic part (Adami et al. 2012). With a free surface that
     is not tracked it is not negative. The velocity is twice the wall's minus the mean of the liquid, which gives the
     wall's velocity at its face. The weight is the liquid within the kernel over ``Fields.wall_room``, at most 1.
-    ``i`` (integer, counting all particles) is the wall particle, ``fluids`` the number of liquid particles,
-    ``neighbours (k,)`` its neighbours, liquid ones first, ``fields`` and ``law`` the ``Fields`` and ``Law`` of all
-    particles.
+
+    Args:
+        i: Number of the wall particle among all particles, integer.
+        fluids: Number of liquid particles, integer; the first wall particle has this number.
+        neighbours: Numbers of its neighbours, liquid ones first, shape (k,).
+        fields: ``Fields``: arrays of position, velocity, density, pressure and mass of all particles, liquid first.
+        law: ``Law``: constants of the particles, such as kernel, smoothing length, density and speed of sound.
+
+    Returns:
+        Tuple of five scalars: pressure [Pa], velocity (x, y, z) [m/s], weight from 0 to 1.
     """
     x, y, z = fields.x[i], fields.y[i], fields.z[i]
     line = law.dimension == 1

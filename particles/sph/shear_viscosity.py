@@ -7,14 +7,8 @@ from math import sqrt
 
 from numba import uint32
 
-from reflowshock.particles.sph.particle_rates import (
-    apart,
-    compiled,
-    liquid_among,
-    periods_of,
-    solved,
-    summed,
-)
+from reflowshock.particles.sph.particle_pairs import apart, compiled, liquid_among, periods_of, summed
+from reflowshock.particles.sph.particle_rates import solved
 from reflowshock.particles.sph.smoothing import slope
 
 NEWTON, POWER_LAW, CARREAU = 0, 1, 2
@@ -23,7 +17,12 @@ LAWS = {"power_law": POWER_LAW, "carreau": CARREAU}
 
 @compiled
 def viscosity_at(rate, law):
-    """Return the viscosity [Pa s] at a shear rate [1/s], both scalars, by the viscosity law of a ``Law``."""
+    """Return the viscosity [Pa s] at a shear rate, a scalar.
+
+    Args:
+        rate: Shear rate, scalar [1/s].
+        law: ``Law``: constants of the particles, with the viscosity law, its exponent, reference rate and bounds.
+    """
     ratio = rate / law.shear_rate
     if law.rheology == CARREAU:
         share = (1.0 + ratio * ratio) ** (0.5 * (law.exponent - 1.0))
@@ -46,8 +45,8 @@ def viscosity_of(i, fluids, neighbours, fields, law):
         i: Number of the particle, integer.
         fluids: Number of liquid particles, integer.
         neighbours: Numbers of its neighbours, liquid ones first, shape (k,).
-        fields: ``Fields`` of all particles.
-        law: ``Law`` of the particles, with the viscosity law.
+        fields: ``Fields``: arrays of position, velocity, density, pressure and mass of all particles, liquid first.
+        law: ``Law``: constants of the particles, such as kernel and smoothing length, with the viscosity law.
     """
     x, y, z, u, v, w = fields.x[i], fields.y[i], fields.z[i], fields.u[i], fields.v[i], fields.w[i]
     inverse = 1.0 / law.length

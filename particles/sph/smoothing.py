@@ -25,13 +25,19 @@ NORMS = {
 
 
 def norm(kernel: int, dimension: int, length: float) -> float:
-    """Return the normalisation sigma of W in ``dimension`` d for a smoothing length h [m], in 1/m^d."""
+    """Return the normalisation sigma of a kernel, with which its integral over space is one, in 1/m^dimension.
+
+    Args:
+        kernel: ``CUBIC_SPLINE`` or ``WENDLAND_C2``.
+        dimension: Dimension of the flow, 1 to 3.
+        length: Smoothing length h [m].
+    """
     return NORMS[kernel][dimension - 1] / length**dimension
 
 
 @njit(cache=True, error_model="numpy")
 def shape(kernel, line, q):
-    """Return the kernel W / sigma, a scalar without unit.
+    """Return the smoothing kernel W over its normalisation sigma, a scalar without unit.
 
     All branches are computed and one is selected, so that a loop can compute several pairs at a time.
 
@@ -49,7 +55,9 @@ def shape(kernel, line, q):
 
 @njit(cache=True, error_model="numpy")
 def slope(kernel, line, q):
-    """Return (dW / dq) / (sigma q), a scalar; grad W is this times sigma / h^2 times the vector between the points.
+    """Return the slope of the smoothing kernel, (dW / dq) / (sigma q), a scalar without unit.
+
+    The gradient of W is this times sigma / h^2 times the vector between the points; sigma is its normalisation.
 
     Args:
         kernel: ``CUBIC_SPLINE`` or ``WENDLAND_C2``.
@@ -64,7 +72,7 @@ def slope(kernel, line, q):
 
 
 def share_beyond_plane(kernel: int, distance: Floats) -> Floats:
-    """Return the share of the integral of W in space beyond a plane, shape (n,).
+    """Return the share of the integral of a kernel W about each point that lies beyond a plane, in space, shape (n,).
 
     Of a sphere of radius r about the point the area 2 pi r (r - distance) is beyond the plane.
 

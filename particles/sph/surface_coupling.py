@@ -127,13 +127,13 @@ def find_weights(points, lists, fields, law, weights):
     """Compute the kernel W between each vertex and the particles near it.
 
     Args:
-        points: Vertices, shape (m, 3) [m].
+        points: Vertices of the surface, shape (m, 3) [m].
         lists: Particles near each vertex in compressed rows: offsets, shape (m + 1,), and indices, shape (pairs,).
-        fields: ``Fields`` of the particles.
-        law: ``Law`` of the particles.
-        weights: Output, shape (2, 2, pairs). ``weights[1]`` is W [1/m^3], mirror images added (``[1, 0]``, for
-            components along the wall z = 0) or subtracted (``[1, 1]``, across it); ``weights[0]`` is the same over the
-            sum of W at the vertex. Without a particle within the support the nearest one has the whole weight.
+        fields: ``Fields``: arrays of position, velocity, density, pressure and mass of all particles, liquid first.
+        law: ``Law``: constants of the particles, such as kernel, smoothing length, density and speed of sound.
+        weights: Output, changed in place, shape (2, 2, pairs). ``weights[1]`` is W [1/m^3], mirror images added (``[1,
+            0]``, for components along the wall z = 0) or subtracted (``[1, 1]``, across it); ``weights[0]`` is the same
+            over the sum of W at the vertex. Without a particle within the support the nearest one has the whole weight.
 
     Returns:
         Sum of W at each vertex, shape (m,) [1/m^3].
@@ -169,7 +169,8 @@ def carry(lists, shares, velocity, time_step, points):
 
     Args:
         lists: Offsets, shape (m + 1,), and indices of the particles near each vertex, shape (pairs,).
-        shares: Weights along and across the wall, shape (2, pairs); they sum to at most one at each vertex.
+        shares: Weights of the particles for the motion along and across the wall z = 0, shape (2, pairs); they sum to
+            at most one at each vertex.
         velocity: Velocities of the particles, shape (3, n) [m/s].
         time_step: Time step, scalar [s].
         points: Vertices, shape (m, 3) [m]; moved in place.
@@ -189,10 +190,11 @@ def distribute(lists, weights, vectors, result):
 
     Args:
         lists: Particles near each vertex in compressed rows: offsets, shape (m + 1,), and indices, shape (pairs,).
-        weights: Weights of each kind of vector, for components along (x, y) and across (z) the wall, (k, 2, pairs).
+        weights: Weights of each kind of vector, for its components along (x, y) and across (z) the wall, shape (k, 2,
+            pairs).
         vectors: Kinds of vectors at the vertices, such as forces, shape (k, m, 3). One thread sums each kind, in one
             order.
-        result: Sums at the particles in the unit of the vectors, shape (k, 3, n), to which is added.
+        result: Sums at the particles in the unit of the vectors, shape (k, 3, n); the vectors are added to it in place.
     """
     offsets, indices = lists
     for kind in prange(vectors.shape[0]):
@@ -212,10 +214,11 @@ def find_distances_to_cover(vertices, lists, fields, cover, distances):
     Args:
         vertices: Points, shape (m, 3) [m], and outward unit normals, shape (m, 3); a tuple.
         lists: Particles near each vertex in compressed rows: offsets, shape (m + 1,), and indices, shape (pairs,).
-        fields: ``Fields`` of the particles.
-        cover: Four scalars: least and largest distance of the surface beyond a particle [m]; half the curvature of the
-            surface about a particle [1/m]; distance outside a vertex from which on particles are left out [m].
-        distances: Output, shape (m,) [m], positive outwards.
+        fields: ``Fields``: arrays of position, velocity, density, pressure and mass of all particles, liquid first.
+        cover: Tuple of four scalars: least and largest distance of the surface beyond a particle [m]; half the
+            curvature of the surface about a particle [1/m]; distance outside a vertex from which on particles are left
+            out [m].
+        distances: Output, shape (m,) [m], positive outwards; overwritten.
     """
     (points, normals), (offsets, indices), (least, most, bend, before) = vertices, lists, cover
     for v in prange(points.shape[0]):

@@ -71,8 +71,8 @@ def add_wall_friction(sums: Floats, fields: Fields, law: Law, rates: Floats) -> 
     Args:
         sums: Kernel summed over all surface vertices, over level ones [1/m^3], and over level ones times their height
             [1/m^2], shape (3, particles).
-        fields: Fields of all particles.
-        law: Parameters of the pair interactions.
+        fields: Arrays of position, velocity, density, pressure and mass of all particles, liquid first.
+        law: Parameters of the pair interactions, such as kernel, smoothing length and density.
         rates: Rates of the n liquid particles, shape (10, n); rows 1 and 2, the acceleration along x and y [m/s^2],
             change.
     """

@@ -23,7 +23,7 @@ def solve_dam_break(
     """Compute a dam break.
 
     Args:
-        scene: Dam break.
+        scene: Parameters of the dam break: column, tank, pressure sensor, liquid and numerics.
         progress: Function called with the completed fraction, 0 to 1.
         checkpoint: Checkpoint to continue from, if its file exists, and to write.
 
@@ -41,7 +41,10 @@ def solve_dam_break(
 
 
 def dam(scene: DamBreak) -> Simulation:
-    """Set up the column at rest under the pressure of its weight, in a tank without a lid, 4 columns high.
+    """Set up the column at rest under the pressure of its weight, in an open tank that is four times as high.
+
+    Args:
+        scene: Parameters of the dam break: column, tank, pressure sensor, liquid and numerics.
 
     Returns:
         Simulation at time 0, to be advanced by ``run_flow``.
@@ -74,7 +77,12 @@ def _pressure_at(scene: DamBreak, simulation: Simulation) -> float:
 
 
 def particles_lost(scene: DamBreak, simulation: Simulation) -> int:
-    """Return the number of liquid particles that have left the tank: beyond the middle of the first layer of a wall."""
+    """Return the number of liquid particles that have left the tank: beyond the middle of the first layer of a wall.
+
+    Args:
+        scene: Size of the tank and particle spacing.
+        simulation: Particles at any time; not changed.
+    """
     liquid, half = slice(simulation.fluids), 0.5 * scene.spacing
     x, z = simulation.fields.x[liquid], simulation.fields.z[liquid]
     return int(((x < -half) | (x > tank_columns(scene) * scene.spacing + half) | (z < -half)).sum())

@@ -40,7 +40,7 @@ def solve_droplet(
     """Compute the motion of a droplet from its start.
 
     Args:
-        scene: Droplet.
+        scene: Parameters of the droplet: liquid, size, wall, speed, effects and numerics.
         progress: Function called with the completed fraction, 0 to 1.
         checkpoint: Checkpoint to continue from, if its file exists, and to write.
 
@@ -61,10 +61,13 @@ def follow(
     """Compute the motion of a droplet from the state of a simulation, which is advanced in place.
 
     Args:
-        scene: Droplet.
+        scene: Parameters of the droplet: liquid, size, wall, speed, effects and numerics.
         simulation: Particles and surface, as ``droplet`` returns them.
         progress: Function called with the completed fraction, 0 to 1.
         checkpoint: Checkpoint to continue from, if its file exists, and to write.
+
+    Returns:
+        Pictures, history and metrics, and for impacts texts on their outcome.
 
     Raises:
         FloatingPointError: A position is not finite.
@@ -86,6 +89,9 @@ def follow(
 def droplet(scene: Droplet) -> Simulation:
     """Set up the particles of a droplet and their surface, whose tension balances the pressure of a sphere.
 
+    Args:
+        scene: Parameters of the droplet: liquid, size, wall, speed, effects and numerics.
+
     Returns:
         Simulation at time 0, with the impact speed if there is one.
     """
@@ -101,10 +107,10 @@ def droplet(scene: Droplet) -> Simulation:
 
 
 def liquid_of(scene: Droplet, spacing: float) -> tuple[Law, float]:
-    """Return the law of a droplet in space and its surface tension.
+    """Return the parameters of the pair interactions of a droplet's liquid, and its surface tension.
 
     Args:
-        scene: Droplet.
+        scene: Parameters of the droplet: liquid, size, wall, speed, effects and numerics.
         spacing: Particle spacing [m].
 
     Returns:

@@ -21,7 +21,7 @@ def solve_poiseuille(
     """Compute the start of channel flow and its error against the exact speeds.
 
     Args:
-        scene: Channel.
+        scene: Parameters of the channel flow: width, speed, duration, liquid and numerics.
         progress: Function called with the completed fraction, 0 to 1.
         checkpoint: Checkpoint to continue from, if its file exists, and to write.
 
@@ -55,6 +55,9 @@ def solve_poiseuille(
 def channel(scene: Poiseuille) -> Simulation:
     """Set up liquid at rest between two plates, periodic along x and driven by a constant force.
 
+    Args:
+        scene: Parameters of the channel flow: width, speed, duration, liquid and numerics.
+
     Returns:
         Simulation at time 0, to be advanced by ``run_flow``.
     """
@@ -70,7 +73,7 @@ def solve_taylor_green(
     """Compute decaying vortices in a periodic box and their error against the exact speeds.
 
     Args:
-        scene: Vortices.
+        scene: Parameters of the vortices: side of the box, speed, duration, liquid and numerics.
         progress: Function called with the completed fraction, 0 to 1.
         checkpoint: Checkpoint to continue from, if its file exists, and to write.
 
@@ -101,6 +104,9 @@ def solve_taylor_green(
 
 def vortices(scene: TaylorGreen) -> Simulation:
     """Set up the vortices of a scene in a periodic box without walls.
+
+    Args:
+        scene: Parameters of the vortices: side of the box, speed, duration, liquid and numerics.
 
     Returns:
         Simulation at time 0, with the exact initial velocities and pressures.

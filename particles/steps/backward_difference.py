@@ -137,13 +137,18 @@ class SteppedMotion:
 
 
 def prepare_physics(physics: Physics, velocity: Floats, carried: dict[int, Floats], time_step: float) -> Physics:
-    """Return the effects as the equivalent backward Euler step from predicted positions uses them.
+    """Return the physics for a two-step method (BDF2) that is solved as a backward Euler step from predicted positions.
+
+    Surface tension and the motions of plates are corrected for the displacement that the prediction already contains.
 
     Args:
         physics: Effects that act on the body; not changed.
-        velocity: Predicted velocity, shape (n, 3) [m/s].
+        velocity: Velocity of the particles in the prediction, shape (n, 3) [m/s].
         carried: Number of a moving plate -> displacement carried on from the last step, shape (6,) [m, rad].
         time_step: Whole time step [s].
+
+    Returns:
+        Copy of the physics with these corrections.
     """
     tensions = (part for part in physics.operators if isinstance(part, SurfaceTension))
     momenta = (*physics.momenta, *(PredictedTension(tension, velocity) for tension in tensions))

@@ -60,7 +60,14 @@ class PinningState:
 
 
 def pinning_of(lines: Sequence[ContactLine]) -> list[PinningState]:
-    """Copy the current pinning of contact lines, for ``restore_pinning``; one copy for each line, in their order."""
+    """Copy the current pinning of contact lines, for ``restore_pinning``.
+
+    Args:
+        lines: Contact lines; not changed.
+
+    Returns:
+        State and pad of each vertex, whether it was stopped at an edge, and the energy constant, for each line.
+    """
     return [PinningState.of(line) for line in lines]
 
 
@@ -117,15 +124,15 @@ class MeshSmoothing:
 
 
 def highest_energy(body: Body, physics: Physics, solver: StepSolver, time_step: float) -> float:
-    """Return the energy that a body must not exceed after a step: that before it, if only energy drives the body [J].
+    """Return the energy that a body must not exceed after a step [J]: its present energy, if only energy drives it.
 
     It is infinite with inertia, with moving plates, whose work is unknown, and with contact-line friction, which has no
     energy.
 
     Args:
-        body: Liquid body.
-        physics: Effects that act on the body.
-        solver: Step solver.
+        body: Liquid body: particles, triangles of its free surface, and plates.
+        physics: Effects that act on the body: forces, friction, contact lines and motions of plates.
+        solver: Step solver, which says whether the body has inertia.
         time_step: Time step [s].
     """
     relaxes = solver.traits.descends and not physics.momenta and all(line.has_energy for line in physics.lines)
@@ -154,10 +161,10 @@ def smooth_surface(body: Body, physics: Physics, volume: float, smoothing: MeshS
     """Flip edges and smooth the surface as far as the energy permits, correct the volume, and stop lines at edges.
 
     Args:
-        body: Liquid body; changed in place.
+        body: Liquid body: particles, triangles of its free surface, and plates; changed in place.
         physics: Effects that act on the body, with contact lines, whose pinning changes.
         volume: Enclosed volume [m^3].
-        smoothing: Passes, flips and the highest energy.
+        smoothing: Number of passes, whether and when edges are flipped, and the highest energy allowed afterwards [J].
 
     Returns:
         Number of flips; None if the energy is too high even without flips and smoothing.

@@ -68,11 +68,13 @@ def _penetration(rows, points, lists, normals, depth):
 
 
 def interior_shift(body: Body, neighbours: NeighbourList, normals: Floats) -> Floats:
-    """Return the shifts of the m particles below the surface, within the wall for those on one, shape (m, 3) [m].
+    """Return displacements that keep the m particles below the surface evenly spaced, shape (m, 3) [m].
+
+    Particles repel each other; those on a wall stay on it, others keep away from surface, walls and planes of symmetry.
 
     Args:
-        body: Liquid body.
-        neighbours: Valid neighbour list with a radius of at least 1.1 spacings.
+        body: Liquid body: particles, triangles of its free surface, and plates.
+        neighbours: Neighbour list for the present positions, with a radius of at least 1.1 spacings.
         normals: Outward unit normals at the vertices of the surface, shape (s, 3).
     """
     cloud, rows = body.cloud, body.interior

@@ -145,8 +145,8 @@ def run_to_rest(
     A body is at rest after three calm steps that last as long as the rule requires.
 
     Args:
-        flow: Flow; advanced in place.
-        rule: Criteria by which the run ends.
+        flow: Liquid body with its physics and step solver; advanced in place.
+        rule: Criteria by which the run ends: tolerance and duration of rest, number of steps, end of the process.
         progress: Function called with the estimated fraction done, in [0, 1].
         on_snapshot: Function called with each new snapshot.
         checkpoint: Checkpoint from which the run continues to the bit, and to which it writes its state.
@@ -189,14 +189,14 @@ def _start(flow: LiquidFlow, on_snapshot: Callable[[Snapshot], None] | None, che
 
 
 def saved_run(flow: LiquidFlow, run: Run) -> dict[str, Any]:
-    """Return the data that a checkpoint keeps of a flow and its run; its dataclasses are ``RECORDS``.
+    """Return the data that a checkpoint stores of a flow and its run; the dataclasses in it are listed in ``RECORDS``.
 
     Args:
         flow: Flow, of which body, physics and step solver are saved.
         run: Records, profiles and snapshots so far.
 
     Returns:
-        State of the flow under ``flow`` and of the run under ``run``.
+        Dictionary with the state of the flow under ``flow`` and of the run under ``run``.
     """
     return {"flow": flow.saved(), "run": run.saved()}
 
@@ -278,8 +278,8 @@ def is_calm(records: Sequence[StepRecord], rule: StopRule) -> bool:
     False before the second step.
 
     Args:
-        records: Records of the steps so far, in order; the last two are compared.
-        rule: Limits of displacement and energy change.
+        records: Records of the steps so far, in order; energy and displacement of the last two are used.
+        rule: Criteria of rest: relative energy change of a step, and time in which the surface moves 1e-4 spacings.
     """
     if len(records) < 2:
         return False

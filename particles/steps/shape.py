@@ -25,7 +25,7 @@ def shifted_indices(indices: Sequence[Indices], counts: Sequence[int]) -> list[I
 
     Args:
         indices: Indices into each array, of any shape.
-        counts: Length of each array.
+        counts: Length of each array; the indices of the first one are not shifted.
 
     Returns:
         Shifted indices of each array, of equal shapes.

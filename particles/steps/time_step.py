@@ -37,10 +37,10 @@ def capillary_limit(density: float, spacing: float, surface_tension: float) -> f
 
 
 def swing_period(solder: Solder, angle: float | None = None) -> float:
-    """Return the period of the slowest mode of a drop of all the solder [s].
+    """Return the period of the slowest oscillation of a drop that contains all the solder [s].
 
     Args:
-        solder: Solder of the case.
+        solder: Solder of the case: volume, fluid, contact angles and numerics.
         angle: Contact angle of a drop on a wall [rad]; None for a free drop.
     """
     if angle is not None:

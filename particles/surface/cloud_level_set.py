@@ -47,6 +47,9 @@ def cloud_from_level_set(level: LevelSet, volume: float, walls: Sequence[Plate])
         volume: Volume of the liquid, kept exactly [m^3].
         walls: Horizontal plates that the liquid stands on or hangs from, the lower one first.
 
+    Returns:
+        Particles, with the triangles of the free surface, contact lines, and a plate for each line.
+
     Raises:
         CannotRebuild: Contact lines meet in a point.
     """
@@ -147,10 +150,10 @@ def with_lids(points: Floats, triangles: Indices, rings: Sequence[Indices]) -> t
     Args:
         points: Vertices, shape (n, 3) [m].
         triangles: Triangles, shape (t, 3).
-        rings: Loops to close, as ``boundary_loops`` returns them.
+        rings: Loops to close as vertices in order, shape (k,) each, as ``boundary_loops`` returns them.
 
     Returns:
-        Vertices, of which the last ones are the mean points, and triangles.
+        Vertices, shape (m, 3) [m], of which the last ones are the mean points, and triangles, shape (s, 3).
     """
     if not rings:
         return points, triangles

@@ -38,9 +38,9 @@ class NewSurface:
 
 @njit(cache=True)
 def extreme_edges(points, triangles):
-    """Return the lengths of the shortest and the longest edge of a triangulation [m], in this order.
+    """Return the lengths of the shortest and of the longest edge of a triangulation, a tuple of two scalars [m].
 
-    Both are scalars.
+    No argument is changed.
 
     Args:
         points: Vertices, shape (n, 3) [m].

@@ -14,9 +14,9 @@ def settle_on_ground(ground: LevelSet, points: Floats, outward: Floats, near: fl
     """Move vertices that have reached the ground onto it.
 
     Args:
-        ground: Distance to the ground [m].
+        ground: Level set of the solid ground: distances at the nodes of a grid [m], negative inside it.
         points: Vertices of the surface, shape (m, 3) [m]; changed in place.
-        outward: Outward normals of the vertices, shape (m, 3).
+        outward: Outward unit normals of the vertices, shape (m, 3); a vertex faces the ground if they point into it.
         near: Distance below which a vertex that faces the ground lies on it [m]; between it and twice it partly so.
 
     Returns:
@@ -32,7 +32,13 @@ def settle_on_ground(ground: LevelSet, points: Floats, outward: Floats, near: fl
 
 
 def remove_normal_part(vectors: Floats, wetness: Floats, normals: Floats) -> Floats:
-    """Return vectors (m, 3) without their component along the ground's normals, in proportion to the wetness (m,)."""
+    """Return vectors without their component normal to the ground, in proportion to the wetness, shape (m, 3).
+
+    Args:
+        vectors: Vectors of any unit at the vertices of a surface, shape (m, 3); not changed.
+        wetness: Share of the component that is removed, 0 to 1, shape (m,).
+        normals: Unit normals of the ground, shape (m, 3).
+    """
     return vectors - (wetness * (vectors * normals).sum(axis=1))[:, None] * normals
 
 
@@ -40,7 +46,7 @@ def reflect_at_ground(ground: LevelSet, points: Floats, vectors: Floats, reach: 
     """Return the mirror images of points and of vectors at them behind the face of the ground.
 
     Args:
-        ground: Distance to the ground [m].
+        ground: Level set of the solid ground: distances at the nodes of a grid [m], negative inside it.
         points: Points, shape (m, 3) [m].
         vectors: Vectors at the points, shape (m, 3).
         reach: Distance beyond which a point has no image [m]; it is returned as it is, with a vector of zero.

@@ -54,7 +54,10 @@ def signed_distance(points: Floats, triangles: Indices, grid: Grid) -> LevelSet:
     Args:
         points: Vertices, shape (n, 3) [m].
         triangles: Outward oriented triangles, shape (t, 3), that share the vertices of their edges.
-        grid: Grid of nodes.
+        grid: Regular grid of nodes: origin, spacing and numbers of nodes.
+
+    Returns:
+        Distances at the nodes of the grid, shape (i, j, k) [m].
     """
     import pyvista  # most reflows need no level set, and start without it
 
@@ -69,8 +72,11 @@ def signed_distance_in_band(points: Floats, triangles: Indices, grid: Grid, band
     Args:
         points: Vertices, shape (n, 3) [m].
         triangles: Outward oriented triangles, shape (t, 3), that share the vertices of their edges.
-        grid: Grid of nodes.
+        grid: Regular grid of nodes: origin, spacing and numbers of nodes.
         band: Largest magnitude [m]; nodes farther from the surface get it with the sign of their side.
+
+    Returns:
+        Distances at the nodes of the grid, shape (i, j, k) [m].
     """
     distance = np.full(grid.shape, band)
     near_distance.lower_to_distance(points, triangles, grid.origin, grid.spacing, distance)
@@ -103,7 +109,7 @@ def winding_numbers_on(grid: Grid, points: Floats, triangles: Indices) -> Indice
     """Return the winding numbers of a closed surface at the nodes of a grid, shape (i, j, k): 1 inside, 0 outside.
 
     Args:
-        grid: Grid of nodes.
+        grid: Regular grid of nodes: origin, spacing and numbers of nodes.
         points: Vertices, shape (n, 3) [m].
         triangles: Outward oriented triangles, shape (t, 3).
     """
@@ -118,7 +124,7 @@ def smooth_union(parts: Sequence[LevelSet], reach: float) -> LevelSet:
     It is the polynomial smooth minimum min(a, b) - max(reach - |a - b|, 0)^2 / (4 reach).
 
     Args:
-        parts: Level sets on the same grid.
+        parts: Level sets on the same grid, negative in the liquid; not changed.
         reach: Twice the width of the widest gap that is bridged [m].
     """
     values = parts[0].values
@@ -155,7 +161,7 @@ def smooth_on_level_set(
         level: Level set that is zero on the surface, symmetric about the walls.
         points: Vertices, shape (n, 3) [m].
         triangles: Triangles, shape (t, 3).
-        rings: Contact lines, each in a horizontal wall, in which it stays.
+        rings: Contact lines as vertices in order, shape (k,) each; each stays in its horizontal wall.
 
     Returns:
         New vertices (n, 3) [m] and triangles (t, 3).
@@ -170,7 +176,15 @@ def smooth_on_level_set(
 
 
 def project_onto_level_set(level: LevelSet, points: Floats) -> Floats:
-    """Move points near the zero level onto it by one Newton step along the gradient; return them, shape (n, 3) [m]."""
+    """Move points near the zero level onto it by one Newton step along the gradient.
+
+    Args:
+        level: Values at the nodes of a grid [m].
+        points: Points, shape (n, 3) [m]; not changed.
+
+    Returns:
+        Moved points, shape (n, 3) [m].
+    """
     gradient = level.gradient(points)
     return points - (level.at(points) / (gradient**2).sum(axis=1))[:, None] * gradient
 

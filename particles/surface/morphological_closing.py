@@ -95,6 +95,9 @@ def smooth_slits(level: LevelSet) -> LevelSet:
 
     Two sheets that cross the same cells share vertices and edges there. A Gaussian of the width of a cell separates or
     closes them; a level set without slits is returned unchanged.
+
+    Args:
+        level: Values at the nodes of a grid, negative in the liquid; not changed.
     """
     for _ in range(SMOOTHINGS):
         edges = np.sort(np.concatenate([extract_surface(level)[1][:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
@@ -127,5 +130,5 @@ def connected_groups(first: Indices, second: Indices, count: int) -> Indices:
 
 
 def count_parts(triangles: Indices) -> int:
-    """Return the number of connected parts of a surface whose vertices all have triangles; shape (t, 3)."""
+    """Return the number of connected parts of a surface, given by its triangles (t, 3); every vertex must have one."""
     return int(part_of_vertex(triangles, int(triangles.max()) + 1).max()) + 1

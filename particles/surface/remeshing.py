@@ -161,7 +161,7 @@ def has_narrow_gap(mesh: SurfaceMesh) -> bool:
     """Return whether parts of a surface are closer than a particle spacing, measured outside the liquid.
 
     Args:
-        mesh: Surface with its particle spacing, and solid ground if there is one.
+        mesh: Triangulated surface of a liquid with its particle spacing, and solid ground if there is one.
     """
     gap = MERGE_GAP * mesh.spacing
     on_ground = mesh.ground is not None
@@ -176,9 +176,10 @@ def _leaves_wall(mesh: SurfaceMesh, is_rising: bool) -> bool:
 
 
 def edge_changes(spacing: float) -> Sequence[Callable[[Floats, Indices, Sequence[Indices]], NewSurface]]:
-    """Return the functions that split long edges and collapse short ones, edges of contact lines included.
+    """Return two functions: one splits long edges, one collapses short edges; both include edges of contact lines.
 
-    Each takes vertices (n, 3) [m], triangles (t, 3) and contact lines, and returns the changed triangulation.
+    Each takes vertices (n, 3) [m], triangles (t, 3) and contact lines, and returns the changed triangulation:
+    triangles, contact lines, and the two old vertices whose mean each new vertex is.
 
     Args:
         spacing: Particle spacing, to which the limits of the lengths are proportional [m].
@@ -195,7 +196,7 @@ def cover_dry_spots(
     Args:
         points: Vertices, shape (m, 3) [m].
         triangles: Triangles, shape (t, 3).
-        rings: Contact lines, clockwise around dry spots.
+        rings: Contact lines as vertices in order, shape (k,) each, clockwise around dry spots.
         spacing: Particle spacing [m].
 
     Returns:
@@ -268,8 +269,9 @@ def smooth_surface(
     Args:
         points: Vertices, shape (m, 3) [m].
         triangles: Triangles, shape (t, 3).
-        rings: Contact lines on the wall z = 0, whose sharp bends are blunted.
-        lines: All lines along which the surface has an edge, the contact lines included.
+        rings: Contact lines on the wall z = 0, whose sharp bends are blunted, as vertices in order, shape (k,) each.
+        lines: All lines along which the surface has a sharp edge, as vertices in order, shape (k,) each, the contact
+            lines included; their vertices move along them.
     """
     points = points + smoothing_offsets(points, triangles, len(points), lines)
     for ring in rings:
@@ -307,7 +309,7 @@ def is_worn(points: Floats, triangles: Indices, rings: Sequence[Indices], spacin
     Args:
         points: Vertices, shape (m, 3) [m].
         triangles: Outward oriented triangles, shape (t, 3).
-        rings: Contact lines; empty for a closed surface.
+        rings: Contact lines as vertices in order, shape (k,) each; empty for a closed surface.
         spacing: Particle spacing, to which the size of triangles is compared [m].
     """
     if not rings and is_folded(points, triangles, spacing):

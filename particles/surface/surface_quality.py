@@ -82,15 +82,15 @@ def smoothing_offsets(
 ) -> Floats:
     """Return tangential displacements that smooth the triangles and keep the shape, shape (count, 3) [m].
 
-    Vertices of the free surface move towards the mean of their triangles' centroids within the tangent plane,
-    vertices of a contact line towards the middle of their neighbours along the line.
+    Vertices of the free surface move towards the mean of their triangles' centroids within the tangent plane, vertices
+    of a contact line towards the middle of their neighbours along the line.
 
     Args:
         points: Points, shape (n, 3) [m], the vertices first.
         triangles: Triangles, shape (t, 3).
         count: Number of vertices.
-        rings: Contact lines, which end on the planes of symmetry if there are any.
-        planes: Axis of each plane of symmetry and the vertices on it.
+        rings: Contact lines as vertices in order, shape (k,) each; they end on the planes of symmetry if there are any.
+        planes: Axis of each plane of symmetry (0 for x = 0, 1 for y = 0) and the vertices on it, shape (j,).
     """
     offset, normal = _centroid_offsets(points, triangles, count)
     for axis, vertices in planes:  # half of the triangles about these vertices is behind the plane
@@ -180,7 +180,7 @@ def flip_to_delaunay(
     Args:
         points: Points, shape (n, 3) [m].
         triangles: Triangles, shape (t, 3).
-        rings: Contact lines.
+        rings: Contact lines as vertices in order, shape (k,) each; may be empty.
         worth: Angle by which the Delaunay criterion is relaxed for each triangle that a flip moves from vertices with
             more than six to vertices with fewer [rad].
 

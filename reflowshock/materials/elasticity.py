@@ -7,7 +7,10 @@ from reflowshock.materials.parameters import EngineeringConstants, Material
 
 
 def elasticity_matrix(material: Material) -> NDArray[np.float64]:
-    """Return the stiffness matrix of a material.
+    """Return the elastic stiffness matrix of a material, in the order xx, yy, zz, xy, yz, xz (engineering shear).
+
+    Args:
+        material: Isotropic or orthotropic material.
 
     Returns:
         Symmetric positive definite matrix of shape (6, 6) [Pa].
@@ -26,7 +29,8 @@ def compliance_matrix(constants: EngineeringConstants) -> NDArray[np.float64]:
     """Return the compliance matrix of an orthotropic material along its axes, shape (6, 6) [1/Pa].
 
     Args:
-        constants: Young's moduli and shear moduli [Pa] and Poisson's ratios; rows and columns are ordered as strains.
+        constants: Young's moduli and shear moduli [Pa] and Poisson's ratios; rows and columns have the order xx, yy,
+            zz, xy, yz, xz (engineering shear).
     """
     compliance = np.diag(1.0 / np.array([*constants.young, *constants.shear]))
     for ratio, (i, j) in zip(constants.poisson, ((0, 1), (1, 2), (0, 2)), strict=True):

@@ -27,6 +27,9 @@ SMALL_GROWTH = 0.01  # relative growth of the plastic strain in a step up to whi
 def plastic_constants(material: Material) -> NDArray[np.float64]:
     """Return the constants of a material for ``yield_stress`` and ``plastic_increment``.
 
+    Args:
+        material: Material with or without plasticity, and the temperature that softens it.
+
     Returns:
         Array of shape (6,): 3 G [Pa], A and B times the thermal softening [Pa], n, C, reference rate [1/s]. A is
         infinite for an elastic material.
@@ -41,7 +44,7 @@ def yield_stress(plastic_strain, rate, constants):
     Args:
         plastic_strain: Equivalent plastic strain, a scalar.
         rate: Rate of the equivalent plastic strain, a scalar [1/s].
-        constants: Array of ``plastic_constants``, shape (6,).
+        constants: Array of ``plastic_constants``, shape (6,): 3 G [Pa], A and B [Pa], n, C, reference rate [1/s].
     """
     factor = 1.0
     if constants[4] > 0.0 and rate > constants[5]:
@@ -50,18 +53,19 @@ def yield_stress(plastic_strain, rate, constants):
 
 
 def plastic_increment(trial_mises, plastic_strain, constants, step):
-    """Return the increment of the equivalent plastic strain over a time step (implicit radial return), at least 0.
+    """Return the increment of the equivalent plastic strain over a time step, a scalar that is at least 0.
 
-    Newton's method solves q - 3 G x = (A + B (p + x)^n) (1 + C ln max(1, x / (dt rate_0))) for the increment x. In
-    y = ln x the residual is decreasing and concave for n in (0, 1]: from the right of the root the iteration does not
-    overshoot, and from the left its first step leads to the right of it. Each step is limited by the increment at the
-    static yield stress, an upper bound. The iteration therefore converges for every rate, exponent and temperature.
+    It is the implicit radial return at one point, a compiled function. Newton's method solves q - 3 G x = (A + B (p +
+    x)^n) (1 + C ln max(1, x / (dt rate_0))) for the increment x. In y = ln x the residual is decreasing and concave for
+    n in (0, 1]: from the right of the root the iteration does not overshoot, and from the left its first step leads to
+    the right of it. Each step is limited by the increment at the static yield stress, an upper bound. The iteration
+    therefore converges for every rate, exponent and temperature.
 
     Args:
-        trial_mises: Mises stress q of the elastic trial state [Pa].
-        plastic_strain: Equivalent plastic strain p before the step.
-        constants: Array of ``plastic_constants``.
-        step: Time step dt [s].
+        trial_mises: Mises stress q of the elastic trial state, a scalar [Pa].
+        plastic_strain: Equivalent plastic strain p before the step, a scalar.
+        constants: Array of ``plastic_constants``, shape (6,): 3 G [Pa], A and B [Pa], n, C, reference rate [1/s].
+        step: Time step dt, a scalar [s].
     """
     stiffness, first, hardening, exponent = constants[0], constants[1], constants[2], constants[3]
     before = hardening * plastic_strain**exponent
@@ -101,9 +105,13 @@ def plastic_increment(trial_mises, plastic_strain, constants, step):
 
 
 def small_power(growth, exponent):
-    """Return (1 + growth)^exponent for a scalar growth below ``SMALL_GROWTH``.
+    """Return (1 + growth)^exponent, a scalar, for a small growth.
 
     Five terms of the series are exact to 1e-13.
+
+    Args:
+        growth: Scalar of a magnitude below ``SMALL_GROWTH``.
+        exponent: Scalar.
     """
     n, e = exponent, growth
     higher = 1.0 + e * (n - 2.0) * THIRD * (1.0 + 0.25 * e * (n - 3.0) * (1.0 + 0.2 * e * (n - 4.0)))

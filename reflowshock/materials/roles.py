@@ -74,7 +74,11 @@ def role_of_part(part: str) -> str:
 
 
 def material_of_part(part: str, materials: Materials) -> Material:
-    """Return the material of a mesh part.
+    """Return the material of a mesh part by its role.
+
+    Args:
+        part: Name of the part, e.g. "solder@A1", which begins with its role.
+        materials: Material of each role: board, substrate, die, copper and solder.
 
     Raises:
         ValueError: The role of the part has no material.

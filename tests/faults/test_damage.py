@@ -19,14 +19,17 @@ from tests.support.workflow_command import SMALL_CASE
 
 
 def truncate(path: Path) -> None:
+    """Cut a file to half of its length."""
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
 
 
 def empty(path: Path) -> None:
+    """Replace a file by an empty one."""
     path.write_bytes(b"")
 
 
 def flip_a_bit(path: Path) -> None:
+    """Flip one bit of a file, at a position that depends on the seed and on the name of the file."""
     content = bytearray(path.read_bytes())
     position = random.Random(f"{SEED} {path.name}").randrange(len(content))
     content[position] ^= 1

@@ -44,12 +44,14 @@ def user_folder():
 
 
 def command(folder: Path, *arguments: str, environment: dict | None = None, before: list[str] | None = None):
+    """Run a command of the program in a folder; return the completed process, with output as bytes."""
     defaults = {"PYTHONPATH": str(ROOT)} | (environment if environment is not None else dict(os.environ))
     line = [*(before or []), sys.executable, "-m", "reflowshock", *arguments]
     return subprocess.run(line, cwd=folder, env=defaults, capture_output=True, timeout=300, check=False)
 
 
 def is_plain(text: bytes) -> bool:
+    """Return whether output has no control characters and no traceback."""
     return not any(byte in text for byte in (b"\x1b", b"\x07", b"Traceback", b"\xc2\x9b"))
 
 
@@ -92,6 +94,7 @@ def test_a_run_of_a_user_without_anything(user_folder, kernels):
 
 
 def mpirun(ranks: int) -> list[str]:
+    """Return the words that start a program on a number of MPI ranks."""
     root = ["--allow-run-as-root"] if os.geteuid() == 0 else []
     return ["mpirun", *root, "--oversubscribe", "-n", str(ranks)]
 

@@ -52,6 +52,7 @@ BAD_TABLES = {
 
 
 def planned(path: Path, *settings: str, force: bool = False) -> None:
+    """Read a case with settings and print its plan; nothing is run."""
     case = read_case(path, settings, oversubscribe=True, force=force)
     show_plan(Store(path.parent / "none", one_run=True), Point({}, case), Console(file=io.StringIO(), width=120))
 
@@ -76,6 +77,7 @@ def mutant(text: str, draw: random.Random) -> bytes:
 
 
 def changed(key: str, value: str, draw: random.Random) -> str:
+    """Return a line of a case file with a random change of its value or its key."""
     kind, numbers = draw.random(), list(re.finditer(r"(?<![\w.])-?\d+\.?\d*", value))
     if kind < 0.5 or not numbers:
         return f"{key}= {draw.choice(VALUES)}"

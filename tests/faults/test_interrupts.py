@@ -35,6 +35,7 @@ def undisturbed(first_run):
 
 
 def same(actual: dict[str, object], expected: dict[str, object]) -> None:
+    """Check that two runs have the same metrics, up to rounding."""
     assert actual.keys() == expected.keys()
     for name, value in expected.items():
         if isinstance(value, float):

@@ -73,6 +73,7 @@ if world.rank == 0:
 
 @pytest.fixture(scope="module")
 def sums_by_ranks(tmp_path_factory) -> dict[int, dict]:
+    """Return number of ranks -> sums that the script prints on them."""
     return {ranks: run_script(SCRIPT, tmp_path_factory.mktemp(f"ranks{ranks}"), ranks) for ranks in (1, 4)}
 
 

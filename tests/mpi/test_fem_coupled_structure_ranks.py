@@ -21,6 +21,7 @@ TABLES = {
 
 
 def request(directory: Path, ranks: int, scheme: str, placement: str) -> Path:
+    """Write mesh and input of a bar in two coupled models; return the path of the input."""
     coupling = {"scheme": scheme, "placement": placement}
     numerics = {"history_samples": 20, "field_samples": 2}
     dynamics = {"duration": 1e-5, "ranks": ranks, "coupling": coupling, "numerics": numerics}
@@ -30,6 +31,7 @@ def request(directory: Path, ranks: int, scheme: str, placement: str) -> Path:
 
 
 def history(directory: Path, placement: str) -> dict[str, np.ndarray]:
+    """Return the arrays of a history, name -> samples, after a check of placement and models."""
     result = json.loads((directory / "out" / "result.json").read_text())
     assert result["model"]["placement"] == placement
     assert set(result["model"]["models"]) == {"macro", "meso"}

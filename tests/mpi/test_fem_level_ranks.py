@@ -43,6 +43,7 @@ def write_march(path: str) -> None:
 
 @pytest.fixture(scope="module")
 def alone() -> np.ndarray:
+    """Return the displacements of all nodes on one rank, in input order, shape (n, 3) [m]."""
     nodes, displacement = moved(MPI.COMM_SELF)
     return displacement[np.argsort(nodes)]
 

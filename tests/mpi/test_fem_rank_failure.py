@@ -56,6 +56,7 @@ sys.exit(program.main(world, sys.argv[1:2]))
 
 @pytest.fixture(scope="module")
 def assembly(tmp_path_factory) -> Path:
+    """Return a folder with the meshes and the input of a shock on two ranks."""
     directory = tmp_path_factory.mktemp("failure")
     meshes = [str(path) for path in write_small_assembly(directory, 1, size=1e-3)]
     shock = {

@@ -108,11 +108,13 @@ def run_all(directory: Path, pairs: Iterable[tuple[Scene, Scene]]) -> Path:
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory) -> Path:
+    """Return the folder with the results of the runs in ``SAME``."""
     return run_all(tmp_path_factory.mktemp("runs"), SAME.values())
 
 
 @pytest.fixture(scope="module")
 def more_runs(tmp_path_factory) -> Path:
+    """Return the folder with the results of the runs in ``SAME_TOO``."""
     return run_all(tmp_path_factory.mktemp("more"), SAME_TOO.values())
 
 
@@ -124,12 +126,14 @@ def arrays_of(output: Path) -> dict[str, np.ndarray]:
 
 @pytest.fixture(scope="module")
 def assembly(tmp_path_factory) -> Path:
+    """Return a folder with the meshes of the small package."""
     directory = tmp_path_factory.mktemp("assembly")
     write_small_assembly(directory)
     return directory
 
 
 def assert_same(first: dict[str, np.ndarray], second: dict[str, np.ndarray]) -> None:
+    """Check that two runs have equal histories and pictures, up to rounding."""
     pictures = [name for name in first if "@" in name]
     assert len(pictures) == 12 + 4 + 2  # of the interface, of a watch point, of two gauges
     for name in (
@@ -178,6 +182,7 @@ def test_ranks_that_carry_both_models_do_not_wait_for_large_messages(tmp_path):
 
 
 def fails(directory: Path, ranks: int, message: str, **changes) -> None:
+    """Check that a run with changed keys of its input fails on some ranks with a message."""
     done = run_program(write_input(directory / "input.json", directory, **changes), ranks)
     assert done.returncode == 1
     assert message in done.stderr

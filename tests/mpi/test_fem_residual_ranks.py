@@ -36,6 +36,7 @@ def written(folder: Path, meshes: list[Path], name: str, ranks: int, **more: obj
 
 
 def result_of(folder: Path, name: str) -> dict:
+    """Return the contents of ``result.json`` of a named run."""
     return json.loads((folder / name / "result.json").read_text())
 
 

@@ -38,12 +38,14 @@ SHOCK = {
 
 @pytest.fixture(scope="module")
 def assembly(tmp_path_factory) -> Path:
+    """Return a folder with the meshes of a small package with one joint."""
     directory = tmp_path_factory.mktemp("restart")
     write_small_assembly(directory, 1, size=1e-3)
     return directory
 
 
 def start(directory: Path, mode: str, output: Path, python: str = sys.executable) -> subprocess.Popen:
+    """Write the input of a run and start it; return its process."""
     meshes = [str(directory / "assembly.msh"), str(directory / "joints.msh")]
     gauge, watch = {"at": [9e-3, 2e-3]}, {"at": [0.0, 0.0, -1e-3]}
     fitted = {"gauges": {"far": gauge}, "watch": {"under": watch}}
@@ -63,11 +65,13 @@ def start(directory: Path, mode: str, output: Path, python: str = sys.executable
 
 
 def finish(process: subprocess.Popen) -> None:
+    """Wait for the end of a process and check that it succeeded."""
     _, errors = process.communicate(timeout=120)
     assert process.returncode == 0, errors
 
 
 def kill_after_some_checkpoints(process: subprocess.Popen, folder: Path, count: int) -> None:
+    """Kill a run as soon as it has written ``count`` checkpoints to a folder."""
     seen: set[tuple[str, int]] = set()
     while len(seen) < count:
         assert process.poll() is None, f"ended before it was killed: {process.stderr and process.stderr.read()}"
@@ -100,10 +104,12 @@ def test_killed_run_continues_to_the_same_bits(assembly):
 
 
 def checkpoints(folder: Path, inputs: object = "one") -> Checkpoints:
+    """Return the checkpoints in a folder of a run with some inputs, on this process."""
     return Checkpoints(MPI.COMM_SELF, folder, inputs, 0.0)
 
 
 def state(number: int | None = None) -> State:
+    """Return a state for a checkpoint that contains one number; None for a state to be filled."""
     return {"model": {"number": Same(number)}}
 
 

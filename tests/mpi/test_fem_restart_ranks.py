@@ -146,6 +146,7 @@ def write_strip(directory: Path, solver: str, ranks: tuple[int, ...], **changes)
 
 @pytest.fixture(scope="module")
 def scenes(tmp_path_factory) -> Path:
+    """Return the folder with the results of all scenes, interrupted and continued on other ranks."""
     directory = tmp_path_factory.mktemp("ranks")
     write_package(directory / "package")
     write_strip(directory / "yielding", "explicit", (2, 3, 1), materials={"steel": WEAK})

@@ -20,6 +20,7 @@ WATCHED = ("board_centre", "die_centre", "von_mises_board", "von_mises_package",
 
 @pytest.fixture(scope="module")
 def assembly(tmp_path_factory) -> Path:
+    """Return a folder with the meshes of the small package."""
     directory = tmp_path_factory.mktemp("assembly")
     write_small_assembly(directory)
     return directory
@@ -33,6 +34,7 @@ def histories(directory: Path, *runs: tuple[str, dict]) -> list[dict[str, np.nda
 
 
 def write_input(directory: Path, scheme: str, ranks: dict) -> Path:
+    """Write the input of a run with a coupling scheme on some ranks; return its path."""
     output = directory / f"{scheme}_{ranks['total']}"
     shock = SHOCK | {"coupling": {"scheme": scheme}, "ranks": ranks}
     meshes = [str(directory / "assembly.msh"), str(directory / "joints.msh")]
@@ -43,6 +45,7 @@ def write_input(directory: Path, scheme: str, ranks: dict) -> Path:
 
 
 def history(output: Path) -> dict[str, np.ndarray]:
+    """Return the history of a run, name -> samples, after a check of its health."""
     result = json.loads((output / "result.json").read_text())
     assert all(check["ok"] for check in result["health"].values())
     assert result["model"]["substeps"] > 1
@@ -51,6 +54,7 @@ def history(output: Path) -> dict[str, np.ndarray]:
 
 
 def difference(first: dict[str, np.ndarray], second: dict[str, np.ndarray]) -> float:
+    """Return the largest difference of watched arrays over their largest value."""
     return max(float(np.abs(first[name] - second[name]).max() / np.abs(first[name]).max()) for name in WATCHED)
 
 

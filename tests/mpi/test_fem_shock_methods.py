@@ -22,24 +22,28 @@ SHOCK = {
 
 @pytest.fixture(scope="module")
 def assembly(tmp_path_factory) -> Path:
+    """Return a folder with the meshes of a small package with one joint."""
     directory = tmp_path_factory.mktemp("methods")
     write_small_assembly(directory, 1, size=1e-3)
     return directory
 
 
 def request(directory: Path, mode: Literal["two_scale", "dns"], name: str, **changes) -> dict:
+    """Return the input of a run as a dictionary; ``changes`` replace keys of the shock."""
     meshes = [str(directory / "assembly.msh"), str(directory / "joints.msh")]
     request = {"mode": mode, "meshes": meshes, "shock": SHOCK | changes, "output": str(directory / name)}
     return request | {"materials": {"solder": "SAC405_elastic"}}
 
 
 def dns(directory: Path, name: str, **changes) -> tuple[dict, dict[str, np.ndarray]]:
+    """Run one model of the package; return its result and its history."""
     (directory / name).mkdir()
     package.run_package(MPI.COMM_SELF, RunInput.model_validate(request(directory, "dns", name, **changes)))
     return results(directory / name)
 
 
 def results(output: Path) -> tuple[dict, dict[str, np.ndarray]]:
+    """Return result and history in a folder, after a check of the run's health."""
     result = json.loads((output / "result.json").read_text())
     assert all(check["ok"] for check in result["health"].values()), result["health"]
     with np.load(output / "history.npz") as arrays:
@@ -47,6 +51,7 @@ def results(output: Path) -> tuple[dict, dict[str, np.ndarray]]:
 
 
 def difference(first: dict[str, np.ndarray], second: dict[str, np.ndarray]) -> float:
+    """Return the largest relative difference of three histories, in the 2-norm."""
     names = ("die_centre", "board_strain", "von_mises_board")
     return max(float(np.linalg.norm(first[k] - second[k]) / np.linalg.norm(second[k])) for k in names)
 

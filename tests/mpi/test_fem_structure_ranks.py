@@ -54,6 +54,7 @@ def written(directory: Path, solver: str, dynamics: dict) -> Path:
 
 
 def history(directory: Path, ranks: int) -> dict[str, np.ndarray]:
+    """Return the arrays of a history, name -> samples, after a check of the number of ranks."""
     result = json.loads((directory / "out" / "result.json").read_text())
     assert result["model"]["ranks"] == ranks
     with np.load(directory / "out" / "history.npz") as arrays:

@@ -24,12 +24,14 @@ PLACES = {
 
 @pytest.fixture
 def ranks(tmp_path):
+    """Yield a pool of two MPI ranks; afterwards its folder is gone."""
     with Ranks(2, True, tmp_path / "ranks.jobs") as pool:
         yield pool
     assert not pool.folder.exists()
 
 
 def jobs(folder, solder) -> dict[str, JointReflow]:
+    """Return the reflow of each joint by name, with checkpoints in a folder."""
     return {name: JointReflow(geometry, solder, folder / name) for name, geometry in PLACES.items()}
 
 

@@ -15,6 +15,7 @@ JOINTS = ["A3", "A4", "B3", "B4"]
 
 @pytest.fixture
 def run(first_run) -> reflowshock.Run:
+    """Return the run of the shortened case as an object of the Python interface."""
     return reflowshock.Run.open(first_run[0])
 
 

@@ -16,6 +16,7 @@ def two_runs(run_folder, tmp_path):
 
 
 def compare(*arguments):
+    """Run the command ``compare`` with arguments; return the completed process."""
     return warm_command("compare", *map(str, arguments))
 
 

@@ -24,6 +24,7 @@ HEATED = (
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
+    """Return the run folder of a heated package, run to the end of its reflow."""
     folder = tmp_path_factory.mktemp("heated")
     result = reflowshock("run", folder, "--until", "reflow", settings=HEATED)
     assert result.returncode == 0, result.stdout + result.stderr

@@ -16,12 +16,14 @@ SETTINGS = ("solder.numerics.scheme=ispg", "solder.effects.inertia=on")
 
 
 def metrics_of(folder):
+    """Return joint -> metric -> value, from the reflow in a run folder."""
     joints = json.loads((folder / "reflow/joints.json").read_text())
     return {name: {key: m["value"] for key, m in joint["metrics"].items()} for name, joint in joints.items()}
 
 
 @pytest.fixture(scope="module")
 def by_ispg(tmp_path_factory):
+    """Return the run folder of a package whose joints flow by the scheme ispg."""
     folder = tmp_path_factory.mktemp("ispg")
     result = reflowshock("run", folder, "--until", "reflow", settings=SETTINGS)
     assert result.returncode == 0, result.stdout + result.stderr

@@ -21,11 +21,13 @@ QUICK = (
 
 
 def record(impact: str, column: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return times [s] and accelerations [m/s^2] of a measured impact."""
     pulse = read_pulse(STRIP / "data" / f"board4_4_impact{impact}.csv", "acceleration", column)
     return pulse.times, pulse.values
 
 
 def filtered(impact: str) -> Acceleration:
+    """Return the acceleration of the board in a measured impact, after the low-pass filter."""
     times, values = record(impact, "board_g")
     return Acceleration(times, values, apply_low_pass(values, times[1] - times[0], LowPass()))
 

@@ -32,6 +32,7 @@ def work(folder: Path, stage: str) -> Path | None:
 
 
 def start(folder: Path, *settings: str) -> subprocess.Popen:
+    """Start a run of the shortened case; return its process."""
     line = command_line("run", folder, settings=settings)
     return subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 

@@ -30,6 +30,7 @@ TIMES = {"seconds", "particle_steps_per_second"}
 
 
 def untimed(record: dict) -> dict:
+    """Return the metrics in a record without timings."""
     return {name: value for name, value in record["metrics"].items() if name not in TIMES}
 
 

@@ -29,6 +29,7 @@ def page(first_run, tmp_path_factory):
 
 
 def pixels(page: Browser) -> list:
+    """Return sampled pixels of the 3D view of a page, after it is drawn."""
     page.value(DRAWN)
     return page.value(PIXELS)
 

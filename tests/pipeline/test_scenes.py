@@ -31,11 +31,13 @@ CONTACT = {"contact_radius", "contact_angle"}
 
 
 def command(name: str, folder: Path, *settings: str) -> list[str]:
+    """Return the words of a command that runs a case of the checkout with settings."""
     line = [sys.executable, "-m", "reflowshock", "run", str(CASES / name / "case.toml"), "--out", str(folder)]
     return [*line, *(item for setting in settings for item in ("--set", setting))]
 
 
 def run(name: str, folder: Path, *settings: str) -> subprocess.CompletedProcess:
+    """Run a case of the checkout with settings to its end; return the completed process."""
     return warm_command(*command(name, folder, *settings)[3:])
 
 
@@ -158,10 +160,12 @@ def short_steps(limit: float) -> tuple[str, str]:
 
 
 def rest_of_drop(case: DropCase) -> np.ndarray:
+    """Return the particle positions of a drop at rest, shape (n, 3) [m]."""
     return drop_to_rest(case.drop, case.molten).shape.points
 
 
 def rest_of_joint(case: JointCase) -> np.ndarray:
+    """Return the particle positions of a joint at rest, shape (n, 3) [m]."""
     return solve_joint(case.joint.geometry, case.molten).points
 
 

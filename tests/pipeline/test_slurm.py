@@ -36,16 +36,19 @@ def slurm(tmp_path_factory):
 
 
 def command(slurm: OneNode, case: Path, folder: Path, settings: tuple[str, ...], *more: str) -> list[str]:
+    """Return the words of a command that runs a case with jobs of Slurm."""
     overrides = [item for setting in settings for item in ("--set", setting)]
     where = ["--executor", "slurm", "--profile", str(slurm.profile)]
     return [sys.executable, "-m", "reflowshock", "run", str(case), "--out", str(folder), *overrides, *where, *more]
 
 
 def run(slurm: OneNode, line: list[str]) -> subprocess.CompletedProcess:
+    """Run a command line in the environment of Slurm; return the completed process."""
     return subprocess.run(line, env=slurm.environment, capture_output=True, text=True, timeout=400, check=False)
 
 
 def metrics(folder: Path) -> dict[str, object]:
+    """Return the metrics in the summary of a run folder without timings, name -> value."""
     metrics_by_name = json.loads((folder / "summary.json").read_text())["metrics"]
     return {name: entry["value"] for name, entry in metrics_by_name.items() if not any(word in name for word in TIMES)}
 

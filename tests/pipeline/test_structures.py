@@ -25,6 +25,7 @@ ERRORS = {
 
 
 def command(what: str, name: str, folder: Path, *settings: str, until: str = "") -> subprocess.CompletedProcess:
+    """Run a command on a case of the checkout with settings; return the completed process."""
     line = [what, str(CASES / name / "case.toml"), "--out", str(folder)]
     line += ["--until", until] if until else []
     line += [item for setting in settings for item in ("--set", setting)]

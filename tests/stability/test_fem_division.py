@@ -19,6 +19,7 @@ from reflowshock.materials.roles import ELASTIC
 
 
 def radius(mesh: MeshData, scheme: str) -> float:
+    """Return the spectral radius of a window of both models into which a scheme divides a mesh."""
     models = models_of(mesh, ELASTIC, Coupling(scheme=scheme), 0.9)
     assert models.division.plan.substeps > 3
     return Coupled(models.bodies(), models.division.plan, scheme_of(scheme)).spectral_radius()

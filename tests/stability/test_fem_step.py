@@ -43,6 +43,7 @@ MESHES = {"sandwich": sandwich(), "blocks": blocks()}
 
 
 def estimates(name: str) -> tuple[Body, dict[str, float]]:
+    """Return a body, and its critical step [s] by elements and by power iteration."""
     body, element = dns_body(MESHES[name], materials=Materials(substrate=SOFT))
     estimate = highest_frequency(MPI.COMM_SELF, body, body.terms, body.mass)
     return body, {"element": element, "power_iteration": estimate.critical_step}
@@ -55,6 +56,7 @@ def random_start(motion: ExplicitMotion) -> None:
 
 
 def energy_of(motion: ExplicitMotion) -> float:
+    """Return kinetic and internal energy of a motion [J]."""
     return motion.kinetic_energy() + motion.internal_energy().total
 
 

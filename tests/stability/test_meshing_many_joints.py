@@ -14,6 +14,7 @@ LARGEST_ERROR, SMALLEST_JACOBIAN = 3.0e-3, 0.2
 
 @pytest.fixture(scope="module")
 def outcomes():
+    """Return the outcome of meshing every tenth joint."""
     return [outcome(sample) for sample in samples(every=10)]
 
 

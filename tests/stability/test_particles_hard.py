@@ -21,6 +21,7 @@ WEIGHTLESS = SolderEffects(gravity="off")
 
 
 def check(flow, run, exact, tolerance):
+    """Check volume, positions, height and width of a drop at rest against its exact shape."""
     last = run.records[-1]
     assert last.volume == pytest.approx(flow.volume, rel=1e-6)
     assert np.isfinite(flow.body.points).all()

@@ -15,11 +15,13 @@ LIMITS = (SOLDER.pad_contact_angle, SOLDER.mask_contact_angle)
 
 
 def follow(gaps):
+    """Return the shapes of a joint at rest at each of some gaps [m]."""
     places = [JointGeometry(gap, RADIUS, RADIUS) for gap in gaps]
     return list(follow_path(places[0], SOLDER, places[1:]))
 
 
 def check(shape, gap, tolerance):
+    """Check standoff, volume, width and waist of a joint at rest against its exact shape."""
     exact = joint_meridian(BALL, RADIUS, RADIUS, gap, GAMMA, WEIGHT, angle_limits=LIMITS)
     assert shape.metrics["standoff"][0] == pytest.approx(gap)
     assert abs(shape.metrics["volume_drift"][0]) < 1e-6

@@ -5,7 +5,7 @@ import pytest
 
 from reflowshock.particles.core.geometry import JointGeometry
 from reflowshock.particles.parameters.solder import Solder, SolderEffects, SolderNumerics
-from reflowshock.particles.scenes.metrics import reference_drop
+from reflowshock.particles.scenes.reference_shapes import reference_drop
 from reflowshock.particles.scenes.reflow import LiquidJoint, solve_joint
 from reflowshock.particles.steps.rest import run_to_rest
 from tests.support.drops import solve_drop
@@ -15,14 +15,17 @@ MM = 1e-3
 
 
 def cylinder(fill, gap, radius=RADIUS):
+    """Return the volume of a cylinder in a gap, times a factor ``fill`` [m^3]."""
     return fill * np.pi * radius**2 * gap
 
 
 def check_energy_falls(energy):
+    """Check that the energy of no step exceeds that before it, up to rounding."""
     assert np.diff(energy).max() < 1e-9 * abs(energy[0])
 
 
 def check(shape, verdict):
+    """Check verdict, volume, positions and width of a joint at rest."""
     assert shape.verdict == verdict
     assert abs(shape.metrics["volume_drift"][0]) < 1e-6
     assert np.isfinite(shape.points).all()

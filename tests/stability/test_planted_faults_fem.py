@@ -13,6 +13,7 @@ from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 
 
 def hard_case(name: str, tried: str) -> HardCase:
+    """Return the first hard case in a file whose trial begins with a text."""
     return next(case for case in read_hard_cases(HARD / f"{name}.toml") if case.tried.startswith(tried))
 
 
@@ -28,6 +29,7 @@ def flipped(add):
 
 
 def caught(case: HardCase) -> bool:
+    """Return whether a hard case misses its limits."""
     return not attempt(case).ok
 
 

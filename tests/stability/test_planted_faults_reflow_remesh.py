@@ -21,6 +21,7 @@ def flip(patch, owner, name):
 
 
 def double_step(patch):
+    """Plant a fault: flows with inertia take twice their time step."""
     whole = InertialFlow.step
     patch.setattr(InertialFlow, "step", lambda self, time_step: whole(self, 2.0 * time_step))
 
@@ -32,10 +33,12 @@ def flip_shear(patch):
 
 
 def forget_volume(patch):
+    """Plant a fault: swept meshes are not scaled to their volume."""
     patch.setattr(levels, "volume_keeping_scale", lambda swept_volume, volume: 1.0)
 
 
 def forget_check(patch):
+    """Plant a fault: surfaces from files are not checked."""
     patch.setattr(user_surface, "check_triangulation", lambda *arguments: None)
 
 

@@ -15,5 +15,9 @@ def _validator() -> jsonschema.Draft202012Validator:
 
 
 def validate(table: Path | dict) -> None:
-    """Raise a ValidationError if the schema rejects a case file or its table."""
+    """Check a case file, or its contents as a dictionary, against the JSON schema.
+
+    Raises:
+        ValidationError: The schema rejects it.
+    """
     _validator().validate(tomllib.loads(table.read_text()) if isinstance(table, Path) else table)

@@ -18,6 +18,10 @@ def bowed_structure(names: list[str], x: np.ndarray, y: np.ndarray, half: float 
         names: Names of the joints.
         x, y: Positions of the joints [m].
         half: Half the length of the package [m]; a quarter of it is modelled.
+
+    Returns:
+        Arrays of ``structure.npz`` by name: nodes ``points`` [m] with ``displacement`` [m] and ``package``,
+        ``temperature`` [K] and residuals of each step, ``pad_motion`` and names of the ``joints``.
     """
     step = 0.5 * MILLI
     lines = {"package": np.arange(0.0, half + 0.1 * step, step), "board": np.arange(0.0, 3 * half, step)}
@@ -47,7 +51,18 @@ def _lift(part: str, x: np.ndarray, y: np.ndarray, half: float) -> np.ndarray:
 def interface(
     names: list[str], x: np.ndarray, y: np.ndarray, times: np.ndarray, factor: float = 1.0
 ) -> dict[str, np.ndarray]:
-    """Return stresses [Pa] on the package pads of joints at ``x``, ``y`` [m]: 16 faces each, increasing outwards."""
+    """Return stresses on the package pads of joints, 16 faces each, increasing outwards.
+
+    Args:
+        names: Names of the joints.
+        x: First coordinates of the joints, shape (n,) [m].
+        y: Second coordinates of the joints, shape (n,) [m].
+        times: Times of the samples, shape (s,) [s].
+        factor: Factor of all stresses.
+
+    Returns:
+        ``times``, and for each joint ``points@NAME`` [m], ``quads@NAME`` and ``von_mises@NAME``, shape (s, 16) [Pa].
+    """
     line = np.linspace(-0.17 * MILLI, 0.17 * MILLI, 5)
     grid = np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
     corner = np.arange(25).reshape(5, 5)
@@ -63,7 +78,7 @@ def interface(
 
 
 def add_chain(run: Path) -> None:
-    """Add the products of the full chain to a run that has dropped a package."""
+    """Add files of heated package, interface stresses and identical joints to the run folder of a dropped package."""
     pads = json.loads((run / "reflow/pads.json").read_text())
     names = [pad["name"] for pad in pads]
     x, y = (np.array([pad[axis] for pad in pads]) for axis in "xy")

@@ -11,7 +11,7 @@ from reflowshock.workflow import cli
 
 
 def commands() -> Mapping[str, Any]:
-    """Return the visible commands by name."""
+    """Return the visible commands of the program by name, as objects of its command line parser."""
     group = typer.main.get_command(cli.app)
     return {name: command for name, command in group.commands.items() if not command.hidden}
 

@@ -10,7 +10,16 @@ from reflowshock.particles.steps.rest import Run
 
 
 def solve_drop(solder: Solder, count: int, pad_radius: float = float("inf")) -> tuple[LiquidFlow, Run]:
-    """Return the flow at rest of a cube with ``count`` particles per edge on a pad or a uniform wall, and its run."""
+    """Let a cube of solder come to rest on a pad or a uniform wall.
+
+    Args:
+        solder: Volume, fluid and contact angles.
+        count: Number of particles along an edge of the cube.
+        pad_radius: Radius of the pad [m]; infinite for a uniform wall.
+
+    Returns:
+        Flow at rest (body, physics, time), and the records of its steps.
+    """
     drop = Drop(
         volume=solder.volume,
         contact_angle=solder.pad_contact_angle,

@@ -20,7 +20,11 @@ NAMES = {joint_name(row, column): (row, column) for row in range(10) for column 
 
 
 def pads(quarter_turns: int = 0) -> dict[str, tuple[float, float]]:
-    """Return the pad positions of U8, rotated counterclockwise about its centre."""
+    """Return the positions of the pads of component U8: pin name -> (x, y) [mm].
+
+    Args:
+        quarter_turns: Number of counter-clockwise rotations by 90 degrees about the centre of U8.
+    """
     pad_lines = {}
     for name, (row, column) in NAMES.items():
         if name not in MISSING:
@@ -32,7 +36,13 @@ def pads(quarter_turns: int = 0) -> dict[str, tuple[float, float]]:
 
 
 def kicad(path: Path, quarter_turns: int = 0, extra: str = "") -> Path:
-    """Write the board as KiCad 8 does, with its y axis down and clockwise footprint rotation."""
+    """Write the board as KiCad 8 does, with its y axis down and clockwise footprint rotation; return the path.
+
+    Args:
+        path: File to write.
+        quarter_turns: Number of counter-clockwise rotations of U8 by 90 degrees.
+        extra: Text appended to the contents of the board.
+    """
     balls = "\n".join(
         f'(pad "{name}" smd circle (at {(column - 4.5) * PITCH:.6f} {(row - 4.5) * PITCH:.6f} {90 * quarter_turns})'
         f' (size {PAD} {PAD}) (layers "F.Cu" "F.Mask") (solder_mask_margin {0.5 * (OPENING - PAD)}))'
@@ -65,7 +75,7 @@ def kicad(path: Path, quarter_turns: int = 0, extra: str = "") -> Path:
 
 
 def gerber(folder: Path) -> Path:
-    """Write the board as Gerber X2, a drill file and a job file; the array is not rotated."""
+    """Write the board as Gerber X2, a drill file and a job file into a folder, which is returned; U8 is not rotated."""
     folder.mkdir(exist_ok=True)
 
     def layer(function: str, body: str, aperture: float) -> str:
@@ -95,7 +105,7 @@ def gerber(folder: Path) -> Path:
 
 
 def ipc2581(path: Path, quarter_turns: int = 0) -> Path:
-    """Write the board as IPC-2581."""
+    """Write the board as IPC-2581 with U8 rotated by 90 degrees ``quarter_turns`` times; return the path."""
 
     def pad(reference: str, pin: str, at: tuple[float, float], shape: str) -> str:
         return (
@@ -135,7 +145,7 @@ def ipc2581(path: Path, quarter_turns: int = 0) -> Path:
 
 
 def table(path: Path) -> Path:
-    """Write the board as a table with some lengths in micrometres."""
+    """Write the board as a CSV table of outline, holes and pads, some lengths in micrometres; return the path."""
     rows = ["kind,reference,pin,x [mm],y [mm],diameter [um],mask_opening [mm]"]
     rows += [f"outline,,,{x},{y},," for x, y in ((0, 0), (LENGTH, 0), (LENGTH, WIDTH), (0, WIDTH))]
     rows += [f"hole,,,{x},{y},{1e3 * HOLE:.0f}," for x, y in HOLES]

@@ -63,7 +63,11 @@ ELSEWHERE_ON = {
 
 
 def calls(work: Callable[[], object]) -> Counter:
-    """Return the number of calls of each Python and compiled function in a piece of work."""
+    """Run a piece of work and count the calls of each Python and compiled function in it.
+
+    Returns:
+        (module, qualified name) -> number of calls; the module of compiled functions is empty.
+    """
     counter: Counter = Counter()
 
     def count(frame, event: str, argument) -> None:
@@ -81,7 +85,12 @@ def calls(work: Callable[[], object]) -> Counter:
 
 
 def enters(counted_calls: Counter, dotted_name: str) -> bool:
-    """Return whether a function, or any method of a class, was called, from its dotted name."""
+    """Return whether a function, or any method of a class, was called.
+
+    Args:
+        counted_calls: Counter that ``calls`` returned.
+        dotted_name: Module and name of the function or class.
+    """
     module, _, name = dotted_name.rpartition(".")
     return any(
         at == module and (qualified == name or qualified.startswith(f"{name}.")) for at, qualified in counted_calls
@@ -89,23 +98,35 @@ def enters(counted_calls: Counter, dotted_name: str) -> bool:
 
 
 def flow_with(acting: Mapping[str, bool], count: int = 5, solder: Solder = SOLDER) -> LiquidFlow:
-    """Return a cube of solder on a wall at its start."""
+    """Return the flow of a cube of solder on a wall, at time 0.
+
+    Args:
+        acting: Effect -> on or off.
+        count: Number of particles along an edge.
+        solder: Volume, fluid and contact angles.
+    """
     cloud = box_cloud(solder.volume ** (1.0 / 3.0), count)
     return start_flow(cloud, solder, dict(acting), (contact_line(cloud, 0, np.inf, solder),))
 
 
 def without(physics: Physics, kind: type) -> Physics:
-    """Return the lists of acting objects without those of one kind."""
+    """Return a copy of the physics whose lists of forces, operators and other objects lack those of one class."""
     lists = {item.name: old for item in fields(physics) if isinstance(old := getattr(physics, item.name), tuple)}
     return replace(physics, **{name: tuple(x for x in old if not isinstance(x, kind)) for name, old in lists.items()})
 
 
 def shock(**changes) -> Shock:
+    """Return the parameters of a shock of 1500 G for 0.5 ms, run for 1 ms; ``changes`` replace or add fields."""
     return Shock(**({"peak_acceleration": 1500 * G, "pulse_duration": 5e-4, "duration": 1e-3} | changes))
 
 
 def strip(kinematics: str = "small", material: Material = FR4) -> tuple[Body, float]:
-    """Return a board strip between two held ends, and half its critical step [s]."""
+    """Return a strip of board with both ends held, and half its critical time step [s].
+
+    Args:
+        kinematics: "small", "corotational" or "finite".
+        material: Material of all elements.
+    """
     lines = np.linspace(0.0, LENGTH, 21), [0.0, 2e-3], np.linspace(0.0, THICKNESS, 3)
     ends = {"mounting_holes": lambda c: on(0, 0.0)(c) | on(0, LENGTH)(c)}
     mesh = mesh_of(*grid(*lines), "board", ends)
@@ -117,13 +138,23 @@ def strip(kinematics: str = "small", material: Material = FR4) -> tuple[Body, fl
 
 
 def loads_of(body: Body, settings: Shock) -> list[Load]:
-    """Return the loads of a shock on a body without holes to shake."""
+    """Return the loads of a shock on a body that has no mounting holes to shake."""
     tables: Any = SimpleNamespace(shaken=np.empty(0, np.int32))
     return shock_loads(MPI.COMM_SELF, float(body.mass.sum()), body, tables, settings)
 
 
 def moved(body: Body, step: float, loads: list[Load], duration: float) -> tuple[ExplicitMotion, float]:
-    """Return the motion after a duration [s], and the largest deflection [m] of its middle until then."""
+    """Move a body in explicit steps from rest.
+
+    Args:
+        body: Strip of ``strip``.
+        step: Time step [s].
+        loads: Loads that act on it.
+        duration: Simulated time [s].
+
+    Returns:
+        Motion at the end, and the largest deflection of the middle until then [m].
+    """
     motion, largest = motion_of(body, step, loads), 0.0
     middle = np.argmin(np.abs(body.local.points[:, 0] - 0.5 * LENGTH))
     for _ in range(round(duration / step)):
@@ -133,6 +164,6 @@ def moved(body: Body, step: float, loads: list[Load], duration: float) -> tuple[
 
 
 def step_of(motion: ExplicitMotion) -> None:
-    """Take a step of a motion."""
+    """Take one step of a motion, in place, force included."""
     motion.advance()
     motion.update_force()

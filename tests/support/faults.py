@@ -15,11 +15,18 @@ TIMES = ("seconds", "per_second", "memory", "wall", "setup", "time_ratio", "core
 
 
 def run_drop(folder: Path, command: str = "run", *options: str, cwd: Path | None = None) -> CompletedProcess:
-    """Run a command on a drop of 125 particles to its end."""
+    """Run a command of the program on a drop of 125 particles to its end and return the completed process.
+
+    Args:
+        folder: Run folder.
+        command: Name of the command.
+        options: Further options of the command.
+        cwd: Folder in which the command runs; None for the present one.
+    """
     return warm_command(command, str(DROP), *SMALL_DROP, "--out", str(folder), *options, cwd=cwd)
 
 
 def answers(folder: Path) -> dict[str, object]:
-    """Return the metrics that a second run must reproduce."""
+    """Return the metrics in the summary of a run folder that a second run must reproduce, name -> value; no timings."""
     metrics = json.loads((folder / "summary.json").read_text())["metrics"]
     return {name: entry["value"] for name, entry in metrics.items() if not any(word in name for word in TIMES)}

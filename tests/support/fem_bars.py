@@ -24,13 +24,25 @@ def speed_of(material: str) -> float:
 
 
 def bar_layers(*layers: tuple[str, float, int, tuple[int, int]]) -> dict[str, dict]:
-    """Return layers ``layer_0``, ``layer_1`` ... from material, thickness [m], elements along the bar and in plane."""
+    """Return the layers of a bar for its input: ``layer_0``, ``layer_1`` ... -> table of the layer.
+
+    Args:
+        layers: Material, thickness [m], number of elements along the bar, and numbers in plane, of each layer.
+    """
     names = ("material", "thickness", "cells", "in_plane")
     return {f"layer_{k}": dict(zip(names, layer, strict=True)) for k, layer in enumerate(layers)}
 
 
 def write_bar(directory: Path, width: float, layers: Mapping[str, dict], pulse: float, **changes) -> StructureInput:
-    """Write mesh and input of a bar under a pulse [s]; ``changes`` replace or add whole tables."""
+    """Write the mesh of a bar along z with held sides, and return the input of its run under a pressure pulse.
+
+    Args:
+        directory: Folder of the mesh; results go to its subfolder ``out``.
+        width: Side of the square cross-section [m].
+        layers: Layers of ``bar_layers``.
+        pulse: Duration of the pulse [s].
+        changes: Tables of the input that replace others or are added.
+    """
     (directory / "out").mkdir(parents=True, exist_ok=True)
     shapes = tuple(BoxLayer(name, *list(layer.values())[1:]) for name, layer in layers.items())
     write_box(Box((width, width), (1, 1), shapes), directory / "bar.msh")
@@ -47,7 +59,7 @@ def write_bar(directory: Path, width: float, layers: Mapping[str, dict], pulse: 
 
 
 def run_bar(request: StructureInput, comm: MPI.Comm = MPI.COMM_SELF) -> tuple[dict, dict[str, np.ndarray]]:
-    """Run a bar; return its result and its history."""
+    """Run a bar; return its result (contents of ``result.json``) and its history, name -> samples; collective."""
     run_structure(comm, request)
     with np.load(request.output / "history.npz") as arrays:
         return json.loads((request.output / "result.json").read_text()), dict(arrays)

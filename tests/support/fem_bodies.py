@@ -9,7 +9,10 @@ STEEL = Isotropic(density=8000.0, young_modulus=200e9, poisson_ratio=0.0)
 
 
 def dense_stiffness(body: Body) -> np.ndarray:
-    """Return the stiffness of a body, (3n, 3n), column by column from its own force terms, tie included."""
+    """Return the stiffness of a body as a dense matrix, shape (3 n, 3 n) [N/m], ordered by node.
+
+    Each column is a force of the body's own force terms at a unit displacement, with its tie.
+    """
     count = len(body.mass)
     columns = np.empty((3 * count, 3 * count))
     for k in range(3 * count):

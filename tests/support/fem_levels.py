@@ -21,7 +21,13 @@ FRACTION = 0.9
 
 
 def joint_on_board(solder: int = 7, edges: int = 3, held: bool = True) -> MeshData:
-    """Return a joint with copper pads, free at its upper end, tied to a small board block that is held on two sides."""
+    """Return a joint with copper pads, free at its upper end, on a small block of board to which it will be tied.
+
+    Args:
+        solder: Number of element layers of solder.
+        edges: Number of elements along the sides of the joint.
+        held: Whether two sides of the block are held.
+    """
     ticks = np.linspace(0, EDGE, 4)
     points, cells = grid(ticks, ticks, [-1.3e-3, -0.8e-3, -0.3e-3, -0.15e-3, 0.0])
     facets = {"board_side": on(2, 0.0)} | ({"mounting_holes": on(0, EDGE), "symmetry_y": on(1, 0.0)} if held else {})
@@ -48,7 +54,18 @@ def levelled(
     comm: MPI.Comm = MPI.COMM_SELF,
     damping: float = 0.0,
 ) -> Levelled:
-    """Return a body whose smallest elements take the innermost step; ``damping``: beta over the window."""
+    """Return a body whose elements take local time steps on several levels, the smallest elements the smallest step.
+
+    Args:
+        mesh: Mesh of the body.
+        materials: Material of each role.
+        ratios: Number of steps of each level in a step of the next outer one.
+        comm: Communicator; collective.
+        damping: Coefficient beta of stiffness-proportional damping over the window, the outermost step.
+
+    Returns:
+        Body with and without levels, level of each element, ratios and window [s].
+    """
     item = prepare(mesh, "dns")["dns"]
     alone = make_rank_elements(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials)
     steps = np.empty(len(alone.steps))
@@ -67,7 +84,12 @@ def levelled(
 
 
 def dense_level_stiffness(model: Levelled, number: int) -> np.ndarray:
-    """Return T^T K T of the elements of a level, (3n, 3n), from their element stiffnesses."""
+    """Return the stiffness T^T K T of the elements of a level with the tie T, dense, shape (3 n, 3 n) [N/m].
+
+    Args:
+        model: Body with levels of ``levelled``.
+        number: Level, 0 for the outermost one.
+    """
     elements = model.body.elements.subset(model.level == number)
     size = 3 * len(model.body.mass)
     matrix = np.zeros((size, size))
@@ -79,10 +101,15 @@ def dense_level_stiffness(model: Levelled, number: int) -> np.ndarray:
 
 
 def dense_effective_stiffness(model: Levelled, number: int = 0, step: float | None = None) -> np.ndarray:
-    """Return K_eff of the elements of a level and inside, in block form by eigenvectors of the moving nodes.
+    """Return the effective stiffness K_eff that a level with its inner levels has in a step, dense, (3 n, 3 n) [N/m].
 
     With A and B the (mass-scaled) stiffness blocks inside and outside, K_eff exceeds the block of the ring by A phi(A),
     B phi(A) and B ((phi - 1) / z)(A) B^T, phi(z) = (2 - 2 T_p(delta - z / omega) / T_p(delta)) / z.
+
+    Args:
+        model: Body with levels of ``levelled``.
+        number: Level, 0 for the outermost one.
+        step: Step of the next outer level [s]; None for the window.
     """
     step = step or model.window
     inner = step if number == 0 else step / model.ratios[number - 1]
@@ -106,7 +133,16 @@ def dense_effective_stiffness(model: Levelled, number: int = 0, step: float | No
 
 
 def filter_of(count: int, nu: float, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return phi(z) and (phi(z) - 1) / z, the latter zero at z = 0, by the Chebyshev polynomials of NumPy."""
+    """Return phi(z) of the stabilised substeps and (phi(z) - 1) / z, zero at z = 0, by NumPy's Chebyshev polynomials.
+
+    Args:
+        count: Number of substeps.
+        nu: Stabilisation, 0 for none.
+        z: Squared frequencies times squared step, shape (n,).
+
+    Returns:
+        Both functions, shape (n,) each.
+    """
     polynomial = np.polynomial.Chebyshev.basis(count)
     delta = 1.0 + nu / count**2
     omega = 2.0 * polynomial.deriv()(delta) / polynomial(delta)
@@ -117,7 +153,12 @@ def filter_of(count: int, nu: float, z: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def moving_components(model: Levelled, number: int) -> np.ndarray:
-    """Return the free components (3n,) outside all elements of outer levels and their slaves."""
+    """Return whether each displacement component is free and moves in the substeps of a level only, shape (3 n,).
+
+    Args:
+        model: Body with levels of ``levelled``.
+        number: Level; nodes of elements of outer levels, and slaves tied to them, do not count.
+    """
     body = model.body
     outer = np.zeros(len(body.mass), dtype=bool)
     for cell in body.elements.cells[model.level < number]:

@@ -15,7 +15,14 @@ GMSH_ORDER = {8: np.argsort(TENSOR_ORDER), 4: np.arange(4), 10: np.array([0, 1, 
 
 
 def bar(length: float, elements: int, width: float, part: str = "board") -> MeshData:
-    """Return a bar along x, one element thick, held at x = 0 (set ``end``)."""
+    """Return the mesh of a bar along x, one element thick, with facet sets ``low`` at x = 0 and ``high`` at its end.
+
+    Args:
+        length: Length [m].
+        elements: Number of elements along x.
+        width: Side of the square cross-section [m].
+        part: Name of the part.
+    """
     points, cells = grid(np.linspace(0, length, elements + 1), [0, width], [0, width])
     return mesh_of(points, cells, part, {"low": on(0, 0.0), "high": on(0, length)})
 
@@ -25,7 +32,13 @@ PATCH, PACKAGE = 3.5e-3, 2.5e-3
 
 
 def board_mesh(size: float = 0.5e-3, layers: int = 4, patch_layers: int = 2) -> MeshData:
-    """Return a quarter board with its patch under the package, held at its far corner."""
+    """Return a quarter of a board with its patch under the package, with the facet sets of symmetry and supports.
+
+    Args:
+        size: Edge length of the elements in plan [m].
+        layers: Number of element layers.
+        patch_layers: Number of upper layers that belong to the part ``board_patch``.
+    """
     x, y = np.arange(0, BOARD_X + size / 2, size), np.arange(0, BOARD_Y + size / 2, size)
     points, cells = grid(x, y, np.linspace(-BOARD_Z, 0, layers + 1))
     centre = points[cells].mean(axis=1)
@@ -42,7 +55,7 @@ def board_mesh(size: float = 0.5e-3, layers: int = 4, patch_layers: int = 2) -> 
 
 
 def package_mesh(size: float = 0.5e-3) -> MeshData:
-    """Return substrate and die above the joints."""
+    """Return the mesh of a quarter of substrate and die above the joints, in elements of ``size`` [m] in plan."""
     low = GAP + 2 * COPPER
     x = np.arange(0, PACKAGE + size / 2, size)
     points, cells = grid(x, x, low + np.array([0.0, 0.2e-3, 0.4e-3, 0.6e-3, 0.8e-3]))
@@ -58,13 +71,18 @@ SITES = {"B2": (0.5e-3, 0.5e-3), "B3": (1.5e-3, 0.5e-3), "A2": (0.5e-3, 1.5e-3),
 
 
 def small_assembly(joints: int = 4, **board: float) -> list[MeshData]:
-    """Return board, package and some joints as meshes without common nodes."""
+    """Return board, package and joints, in this order, as meshes without common nodes.
+
+    Args:
+        joints: Number of joints, 1 to 4.
+        board: Arguments of ``board_mesh``.
+    """
     sites = list(SITES.items())[-joints:]
     return [board_mesh(**board), package_mesh(), *(joint_mesh(name, x, y) for name, (x, y) in sites)]
 
 
 def write_msh(mesh: MeshData, path: Path) -> None:
-    """Write a mesh as Gmsh 4.1 with physical names."""
+    """Write a mesh as MSH 4.1 in metres, its parts and facet sets as physical groups."""
     gmsh.initialize(interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
@@ -89,7 +107,7 @@ def write_msh(mesh: MeshData, path: Path) -> None:
 
 
 def write_small_assembly(directory: Path, joints: int = 4, **board: float) -> list[Path]:
-    """Write ``assembly.msh`` and ``joints.msh``; return their paths."""
+    """Write ``assembly.msh`` and ``joints.msh`` of ``small_assembly`` into a folder; return their paths."""
     board_part, package, *others = small_assembly(joints, **board)
     paths = [directory / "assembly.msh", directory / "joints.msh"]
     write_msh(append([board_part, package]), paths[0])

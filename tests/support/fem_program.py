@@ -18,7 +18,7 @@ MPIRUN = ["mpirun", "--bind-to", "none", "--allow-run-as-root", "--oversubscribe
 
 
 def run_program(path: Path, ranks: int) -> subprocess.CompletedProcess:
-    """Run ``python -m fem`` on an input file."""
+    """Run ``python -m reflowshock.fem`` on an input file on several ranks; return the completed process."""
     return run_python(["-m", "reflowshock.fem", str(path)], ranks, python=warm_python())
 
 
@@ -29,7 +29,7 @@ def run_programs(inputs: list[tuple[int, Path]]) -> None:
 
 
 def run_warm(words: list[str], ranks: int) -> subprocess.CompletedProcess:
-    """Run the module ``on_ranks`` and require success."""
+    """Run the module ``on_ranks`` with arguments on several ranks, require success and return the completed process."""
     line = ["-m", "tests.support.on_ranks", *words]
     done = run_python(line, ranks, timeout=400.0, python=warm_python())
     assert done.returncode == 0, done.stderr
@@ -37,7 +37,7 @@ def run_warm(words: list[str], ranks: int) -> subprocess.CompletedProcess:
 
 
 def run_script(text: str, directory: Path, ranks: int) -> dict:
-    """Run a script with the directory as argument; return the JSON that it prints."""
+    """Run the text of a Python script on several ranks with a directory as argument; return the JSON that it prints."""
     script = directory / "script.py"
     script.write_text(text)
     return json.loads(run_warm([str(script), str(directory)], ranks).stdout)
@@ -46,7 +46,14 @@ def run_script(text: str, directory: Path, ranks: int) -> dict:
 def run_python(
     arguments: list[str], ranks: int, timeout: float = 120.0, python: str = sys.executable
 ) -> subprocess.CompletedProcess:
-    """Run Python on several ranks with the packages of this checkout."""
+    """Run Python on several ranks with the packages of this checkout; return the completed process, failed or not.
+
+    Args:
+        arguments: Arguments of Python.
+        ranks: Number of ranks.
+        timeout: Time after which the run is stopped [s].
+        python: Path of Python.
+    """
     return subprocess.run(
         [*MPIRUN, str(ranks), python, *arguments],
         cwd=ROOT,

@@ -58,7 +58,15 @@ def cooled(
     formulation: str = "incompatible_modes",
     response: ForceOptions = SMALL,
 ) -> Cooled:
-    """Cool a mesh on its symmetry planes and return bodies without and with the initial stress."""
+    """Cool a mesh on its symmetry planes and return bodies without and with the initial stress.
+
+    Args:
+        mesh: Mesh with the facet sets of its symmetry planes.
+        materials: Role -> material.
+        change: Change of temperature [K].
+        formulation: Kind of element.
+        response: Kinematics and damping of the force terms.
+    """
     item = add_pins(model_inputs(join_meshes(mesh), "dns", SYMMETRY)["dns"])
     rank_elements = make_rank_elements(distribute(MPI.COMM_SELF, item.mesh), item.tables, materials, formulation)
 

@@ -15,7 +15,12 @@ STEEL = {"kind": "isotropic", "density": 8000.0, "young_modulus": 200e9, "poisso
 
 
 def strip_mesh(cells: tuple[int, int, int] = (8, 3, 2), layers: tuple[str, ...] = ("board",)) -> MeshData:
-    """Return the strip of ``structure_input`` with layers of equal thickness."""
+    """Return the mesh of a rectangular strip with layers of equal thickness and facet sets on all sides.
+
+    Args:
+        cells: Numbers of elements along x, y and z.
+        layers: Names of the layers, lowest first.
+    """
     x = np.linspace(-LENGTH / 2, LENGTH / 2, cells[0] + 1)
     y = np.linspace(-WIDTH / 2, WIDTH / 2, cells[1] + 1)
     points, hexahedra = grid(x, y, np.linspace(0.0, THICKNESS, cells[2] + 1))
@@ -26,7 +31,7 @@ def strip_mesh(cells: tuple[int, int, int] = (8, 3, 2), layers: tuple[str, ...] 
 
 
 def structure_tables_of(**changes) -> dict:
-    """Return the input of a clamped steel strip under a shock; ``changes`` replace whole tables."""
+    """Return the tables of the input of a clamped steel strip under a shock; ``changes`` replace whole tables."""
     tables = {
         "mode": "structure",
         "solver": "explicit",
@@ -46,7 +51,13 @@ def structure_tables_of(**changes) -> dict:
 
 
 def write_structure(directory: Path, mesh: MeshData | None = None, **changes) -> Path:
-    """Write mesh and input of a structure; return the input's path. The results go to ``directory / "out"``."""
+    """Write mesh and input file of a structure; return the path of the input.
+
+    Args:
+        directory: Folder of the files; results go to its subfolder ``out``.
+        mesh: Mesh; None for the strip of ``strip_mesh``.
+        changes: Tables of the input that replace others.
+    """
     path = directory / "structure.msh"
     write_msh(mesh or strip_mesh(), path)
     tables = {"mesh": str(path), "output": str(directory / "out")} | structure_tables_of(**changes)
@@ -56,7 +67,13 @@ def write_structure(directory: Path, mesh: MeshData | None = None, **changes) ->
 
 
 def structure_input(directory: Path, mesh: MeshData | None = None, **changes) -> StructureInput:
-    """Return the input of a structure and write its mesh."""
+    """Write the mesh of a structure and return the input of its run; arguments as of ``write_structure``.
+
+    Args:
+        directory: Folder of the mesh; results go to its subfolder ``out``.
+        mesh: Mesh; None for the strip of ``strip_mesh``.
+        changes: Tables of the input that replace others.
+    """
     request = INPUT.validate_json(write_structure(directory, mesh, **changes).read_text())
     assert isinstance(request, StructureInput)
     request.output.mkdir(exist_ok=True)

@@ -31,7 +31,7 @@ SHIFT = 1e-7  # node shift for finite differences, over the mesh size
 
 
 def yielding(pair: Pair) -> Materials:
-    """Return the materials of a pair with a yielding block."""
+    """Return the materials of a pair of coupled models, with plastic solder in its block."""
     materials = pair.materials()
     modulus = materials.solder.young_modulus
     law = JohnsonCook(A=YIELD * modulus, B=HARDENING * modulus)
@@ -39,13 +39,23 @@ def yielding(pair: Pair) -> Materials:
 
 
 def on_path(points: np.ndarray, share: float) -> np.ndarray:
-    """Return displacements [m], shape (n, 3), at a share of the path: uniform rotation and strain."""
+    """Return displacements on a path of uniform rotation and strain, shape (n, 3) [m].
+
+    Args:
+        points: Positions at rest, shape (n, 3) [m].
+        share: Share of the path, 0 to 1.
+    """
     rotation = Rotation.from_rotvec(share * ANGLE * AXIS).as_matrix()
     return points @ (rotation @ (np.eye(3) + share * STRAIN)).T - points
 
 
 def tangent(term: ForceTerm, points: np.ndarray) -> AssembledElements:
-    """Return linear elements with the tangent stiffness of a term at the end of the path; the term ends there."""
+    """Return linear elements with the tangent stiffness of a force term at the end of the path of ``on_path``.
+
+    Args:
+        term: Force term of nonlinear elements; its state moves to the end of the path.
+        points: Nodes at rest, shape (n, 3) [m].
+    """
     for step in range(1, STEPS + 1):
         term.add(on_path(points, step / STEPS), np.zeros_like(points))
     history = {name: values.copy() for name, values in term.history.items()}
@@ -67,12 +77,19 @@ def tangent(term: ForceTerm, points: np.ndarray) -> AssembledElements:
 
 
 def flowing(body: Body) -> Body:
-    """Return a body with the tangents of its terms."""
+    """Return a body whose force terms are replaced by their tangents, as ``tangent`` returns them."""
     return replace(body, terms=[tangent(term, body.local.points) for term in body.terms])
 
 
 def flowing_pair(pair: Pair, coupling: Coupling, fraction: float = FRACTION, formulation: str = "one_point") -> Coupled:
-    """Return both models of a pair in finite rotation with a flowing block, at the program's own steps."""
+    """Return both coupled models of a pair in finite rotation with a block that flows plastically, linearised there.
+
+    Args:
+        pair: Macro and meso model: substeps, impedance ratio, shape.
+        coupling: Settings of the coupling scheme.
+        fraction: Time step over the critical step.
+        formulation: Kind of element.
+    """
     materials = yielding(pair)
     models = models_of(pair.mesh(), materials, coupling, fraction)
     response = ForceOptions("corotational", models.division.meso_step)

@@ -22,25 +22,35 @@ class Marking:
 
 
 def forged_pickle(marker: Path) -> bytes:
-    """Return a pickle that creates a marker when it is read."""
+    """Return the bytes of a pickle that creates the file ``marker`` when it is read."""
     return pickle.dumps(Marking(marker))
 
 
 def forged_array(marker: Path) -> bytes:
-    """Return an npz with one object array that creates a marker when it is read."""
+    """Return the bytes of an NPZ file with one object array that creates the file ``marker`` when it is read."""
     archive = io.BytesIO()
     np.savez(archive, tree=np.array([Marking(marker)], object))
     return archive.getvalue()
 
 
 def with_digest(content: bytes, rest: bytes) -> bytes:
-    """Return a file with the header of another file, a different body and a matching digest."""
+    """Return the contents of a data file with the header of another one, a different body and a matching digest.
+
+    Args:
+        content: Contents of a file of ``write_data``, whose header is used.
+        rest: Body of the new file.
+    """
     new = content.split(b"\n", 2)[1] + b"\n" + rest
     return FORMAT + sha256(new).hexdigest().encode() + b"\n" + new
 
 
 def flipped(content: bytes, share: float) -> bytes:
-    """Return a file with one flipped bit at a share of its length."""
+    """Return the contents of a file with one flipped bit.
+
+    Args:
+        content: Contents of the file.
+        share: Position of the bit over the length, 0 to 1.
+    """
     at = min(int(share * len(content)), len(content) - 1)
     return content[:at] + bytes([content[at] ^ 4]) + content[at + 1 :]
 

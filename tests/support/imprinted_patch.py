@@ -82,7 +82,14 @@ class Mesh:
 
 
 def patch(mesh: Mesh) -> tuple[Whole, JointMesh]:
-    """Mesh the patches and the joint between them."""
+    """Mesh patches of board and substrate and the joint between them.
+
+    Args:
+        mesh: Settings of the mesh.
+
+    Returns:
+        Joined mesh of all parts with its ties, and the mesh of the joint.
+    """
     numerics = {"element_size": mesh.box}
     layer = {"length": SIDE, "width": SIDE, "thickness": 0.4 * MM, "elements": mesh.layers[1]}
     package_of_joint = package(
@@ -105,7 +112,15 @@ def patch(mesh: Mesh) -> tuple[Whole, JointMesh]:
 def free_form_joint(
     surface: ClosedSurface, site: PadSite, whole: Package, side: PackageSide, columns: tuple[Column, ...]
 ) -> JointMesh:
-    """Mesh a joint by the free-form method even if it could be swept."""
+    """Mesh a joint by the free-form method even if it could be swept; arguments as of ``mesh_joint``.
+
+    Args:
+        surface: Closed surface of the solder.
+        site: Positions and sizes of its pads.
+        whole: Package with copper and numerics.
+        side: Underside of the package.
+        columns: Columns of board and substrate that continue the pads.
+    """
     copper = CopperPads(whole.copper.thickness, whole.joint_numerics.copper_layers, columns=columns)
     joint_place = JointPlace.of(surface, site, side, copper.thickness)
     build = partial(build_joint, sites=[site], copper=copper, place=joint_place)
@@ -113,7 +128,10 @@ def free_form_joint(
 
 
 def box_lines(mesh: Mesh) -> Floats:
-    """Return the lines of the boxes along x and y [m]; the shift moves all but the sides and the column edges."""
+    """Return the grid lines of the boxes along x and y, shape (n,) [m].
+
+    The shift of the mesh settings moves all lines except the sides and the edges of the column.
+    """
     count = round(SIDE / mesh.box)
     lines = SIDE * (np.arange(count + 1) / count - 0.5)
     if not mesh.shift:
@@ -124,7 +142,14 @@ def box_lines(mesh: Mesh) -> Floats:
 
 
 def boxes(name: str, x: Floats, levels: Floats, y: Floats | None = None) -> MeshData:
-    """Return a block of boxes between lines [m], with its face towards the joint as a side of ``tie_joints``."""
+    """Return a block of boxes, with its face towards the joint as the facet set ``NAME_side``.
+
+    Args:
+        name: Name of the part; of any other part than "board" the lower face is the set ``package_side``.
+        x: Grid lines along x [m].
+        levels: Grid lines along z [m].
+        y: Grid lines along y [m]; None for those along x.
+    """
     lines = levels, x if y is None else y, x
     points = np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1)[..., ::-1].reshape(-1, 3)
     number = np.arange(len(points)).reshape([len(line) for line in lines])
@@ -140,7 +165,7 @@ def boxes(name: str, x: Floats, levels: Floats, y: Floats | None = None) -> Mesh
 
 
 def data_of(joint: JointMesh) -> MeshData:
-    """Return a joint as ``MeshData``."""
+    """Return the mesh of a joint in the form that the fem program reads: nodes, cells, parts and facet sets."""
     parts = [np.full(len(cells), number, np.int32) for number, cells in enumerate(joint.cells.values())]
     cells = np.concatenate(list(joint.cells.values()))[:, HEXAHEDRON.order]
     return MeshData(joint.points, cells, np.concatenate(parts), tuple(joint.cells), joint.facets)
@@ -209,7 +234,12 @@ class Problem:
 
 
 def solution(matrix: scipy.sparse.csr_matrix, right: Floats) -> Floats:
-    """Solve with MUMPS."""
+    """Return the solution of a symmetric linear system by MUMPS, shape (n,).
+
+    Args:
+        matrix: Matrix, shape (n, n).
+        right: Right-hand side, shape (n,).
+    """
     csr = (matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32), matrix.data)
     petsc = PETSc.Mat().createAIJ(matrix.shape, csr=csr, comm=MPI.COMM_SELF)
     petsc.setOption(PETSc.Mat.Option.SYMMETRIC, True)
@@ -223,7 +253,14 @@ def solution(matrix: scipy.sparse.csr_matrix, right: Floats) -> Floats:
 
 
 def prescribed(mesh: MeshData) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return the prescribed motion [m], shape (n, 3), and the mask of its components."""
+    """Return the full motion of the patches' sides at x = const, and which components are prescribed.
+
+    Args:
+        mesh: Mesh of both patches and the joint; on a half mesh y = 0 is a plane of symmetry.
+
+    Returns:
+        Displacements, shape (n, 3) [m], and whether each component is prescribed, shape (n, 3).
+    """
     held = np.abs(np.abs(mesh.points[:, 0]) - 0.5 * SIDE) < SAME
     on_board = held & (mesh.points[:, 2] <= SAME) & (mesh.points[:, 0] > 0.0)
     motion = np.zeros_like(mesh.points)
@@ -235,7 +272,15 @@ def prescribed(mesh: MeshData) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
 
 
 def prescribed_at(mesh: MeshData, angle: float) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Return the motion of all sides at an angle [rad], as ``prescribed``."""
+    """Return the motion of all sides of the patches along a direction in plan, and which components are prescribed.
+
+    Args:
+        mesh: Mesh of both patches and the joint.
+        angle: Direction of the motion, from the x axis [rad].
+
+    Returns:
+        Displacements, shape (n, 3) [m], and whether each component is prescribed, shape (n, 3).
+    """
     along = np.array([np.cos(angle), np.sin(angle), 0.0])
     held = np.abs(np.abs(mesh.points[:, :2]) - 0.5 * SIDE).min(axis=1) < SAME
     share = np.where(held & (mesh.points[:, 2] <= SAME), 0.5 + mesh.points @ along / SIDE, 0.0)
@@ -243,7 +288,7 @@ def prescribed_at(mesh: MeshData, angle: float) -> tuple[NDArray[np.float64], ND
 
 
 def half_of(whole: Whole) -> Whole:
-    """Return the half y >= 0 of a symmetric mesh with a line of nodes at y = 0."""
+    """Return the half y >= 0 of a joined symmetric mesh, which has a line of nodes at y = 0, with its ties."""
     tie, each = whole.tie, np.arange(len(whole.tie.slave))
     heaviest = tie.master[each, tie.weight.argmax(axis=1)][:, None]
     on_plane = replace(tie, master=np.where(tie.weight < SAME, heaviest, tie.master))  # zero weight at y < 0
@@ -252,14 +297,24 @@ def half_of(whole: Whole) -> Whole:
 
 
 def is_half(mesh: MeshData) -> bool:
-    """Return whether a mesh ends at y = 0."""
+    """Return whether a mesh has no nodes at y < 0, as ``half_of`` returns it."""
     return bool(mesh.points[:, 1].min() > -SAME)
 
 
 def ends(
     problem: Problem, displacement: Floats, layers: Sequence[float] = (LAYER,)
 ) -> Iterator[tuple[str, dict[str, float]]]:
-    """Yield the measures of both ends: section forces [N, N m], averages over layers of a thickness [Pa, J/m^3]."""
+    """Yield the name of each end of the joint, "board" or "package", and its measures by name.
+
+    Args:
+        problem: Static problem with mesh and materials.
+        displacement: Displacements of the nodes, shape (n, 3) [m].
+        layers: Thicknesses of the layers at the pad over which averages are taken [m].
+
+    Yields:
+        Name and ``axial_force``, ``shear_force`` [N], ``bending_moment`` [N m], and for each layer ``von_mises:Num``
+        [Pa] and ``plastic_work:Num`` [J/m^3].
+    """
     mesh = problem.whole.mesh
     cells = mesh.in_parts(f"solder@{JOINT}".__eq__)
     solder = replace(problem.hencky, elements=problem.elements.subset(cells))

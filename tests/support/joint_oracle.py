@@ -199,7 +199,7 @@ class Newton:
 
 
 def equilibrium(patch: Patch, steps: int = 1) -> list[dict[str, float]]:
-    """Return the measures at equal shares of the full motion, at rest."""
+    """Return the measures of the joint at each of ``steps`` equal shares of the full motion, in static equilibrium."""
     displacement, nothing, history = np.zeros(len(patch.full)), np.zeros(len(patch.full)), []
     newton = Newton(patch, (0.0, 1.0))
     for step in range(1, steps + 1):
@@ -223,7 +223,7 @@ class Motion:
 
 
 def haversine(duration: float) -> Motion:
-    """Return the motion sin^2(pi t / T) times the full motion, over a duration [s]."""
+    """Return the motion sin^2(pi t / T) times the full motion, with the duration T [s]."""
     rate = np.pi / duration
     return Motion(lambda time: np.sin(rate * time) ** 2, lambda time: 2.0 * rate**2 * np.cos(2.0 * rate * time))
 

@@ -158,7 +158,16 @@ class Lattice:
 
 
 def mesh_patch(patch: JointPatch, fineness: Fineness, degree: int) -> Lattice:
-    """Mesh a patch: rings around the joint's axis, swept along it; board, joint and substrate share their nodes."""
+    """Mesh a patch with rings around the joint's axis; board, joint and substrate share their nodes.
+
+    Args:
+        patch: Dimensions and materials.
+        fineness: Numbers of elements and grid lines.
+        degree: Polynomial degree of the elements.
+
+    Returns:
+        Nodes, and the nodes of the hexahedra of each part.
+    """
     blocks = [*_disc(patch, fineness, degree), *_surroundings(patch, fineness, degree)]
     plane = np.concatenate([block for block, _ in blocks])
     within = np.concatenate([np.full(len(block), inside) for block, inside in blocks])

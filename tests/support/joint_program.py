@@ -40,14 +40,21 @@ PARTS = ("board", "copper", "solder", "substrate")
 
 
 def matching_mesh(patch: JointPatch, fineness: Fineness) -> MeshData:
-    """Return the patch with pads imprinted in board and substrate, in hexahedra with 8 nodes."""
+    """Return the mesh of a patch with pads imprinted in board and substrate, in hexahedra with 8 nodes."""
     lattice = mesh_patch(patch, fineness, 1)
     hexahedra = {part: cells.astype(np.int32) for part, cells in lattice.cells.items()}
     return _assembled(patch, lattice.points, hexahedra)
 
 
 def box_mesh(patch: JointPatch, fineness: Fineness, size: float, layers: tuple[int, int]) -> MeshData:
-    """Return the joint tied to non-matching boxes of a size [m]; ``layers`` of board and substrate."""
+    """Return the mesh of a joint between non-matching boxes, to which it will be tied.
+
+    Args:
+        patch: Dimensions and materials.
+        fineness: Numbers of elements and grid lines of the joint.
+        size: Edge length of the boxes in plan [m].
+        layers: Numbers of box layers of board and substrate.
+    """
     lattice = mesh_patch(patch, fineness, 1)
     points, hexahedra = lattice.points, {part: lattice.cells[part].astype(np.int32) for part in ("copper", "solder")}
     x = np.linspace(-0.5, 0.5, round(patch.side / size) + 1) * patch.side
@@ -100,7 +107,14 @@ class Course:
 
 
 def request_of(patch: JointPatch, mesh: MeshData, course: Course, directory: Path) -> StructureInput:
-    """Write mesh and motion, and return the input of an explicit run."""
+    """Write mesh and motion of a patch, and return the input of an explicit run.
+
+    Args:
+        patch: Dimensions, materials and full motion.
+        mesh: Mesh of the patch.
+        course: Duration of the motion, and whether the solder yields.
+        directory: Folder of the files and of the results.
+    """
     write_msh(mesh, directory / "patch.msh")
     times = np.linspace(0.0, course.duration, 401)
     loads = {}

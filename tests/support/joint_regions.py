@@ -30,7 +30,7 @@ DEVIATOR[:3, :3] -= 1.0 / 3.0
 
 
 def stiffness_matrix(material: Material) -> Floats:
-    """Return C ``(6, 6)`` [Pa] of strains xx yy zz xy yz xz, shear as engineering strain, from the nine constants."""
+    """Return the stiffness of a material, shape (6, 6) [Pa]: xx, yy, zz, xy, yz, xz (engineering shear)."""
     (x, y, z), (xy, yz, xz), shear = material.engineering_constants
     compliance = np.diag([1 / x, 1 / y, 1 / z, *(1 / value for value in shear)])
     compliance[0, 1] = compliance[1, 0] = -xy / x
@@ -47,14 +47,14 @@ def lattice_order() -> NDArray[np.int64]:
 
 
 def strain_of(displacement: ufl.core.expr.Expr) -> ufl.core.expr.Expr:
-    """Return the strain (6,), xx yy zz xy yz xz, of a displacement or a test function."""
+    """Return the strain of a displacement or a test function as a UFL vector, engineering shear in xy, yz, xz last."""
     g = ufl.grad(displacement)
     shear = [g[0, 1] + g[1, 0], g[1, 2] + g[2, 1], g[0, 2] + g[2, 0]]
     return ufl.as_vector([g[0, 0], g[1, 1], g[2, 2], *shear])
 
 
 def von_mises(stress: Floats) -> Floats:
-    """Return von Mises' stress ``(...)`` of stresses ``(..., 6)``."""
+    """Return von Mises' stress, shape (...) [Pa], of stresses xx, yy, zz, xy, yz, xz, shape (..., 6) [Pa]."""
     deviator = stress @ DEVIATOR
     return np.sqrt(1.5 * np.einsum("...c,...c,c->...", deviator, deviator, ENGINEERING))
 

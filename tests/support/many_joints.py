@@ -40,7 +40,7 @@ class Sample:
 
 
 def samples(every: int = 1) -> Iterator[Sample]:
-    """Return every ``every``-th joint of each kind, including the first."""
+    """Yield every ``every``-th joint of each kind, including the first: its kind, closed surface and pad sites."""
     for seed, (kind, count) in enumerate(COUNTS.items()):
         generator = np.random.default_rng(seed)
         for number in range(count):
@@ -50,14 +50,18 @@ def samples(every: int = 1) -> Iterator[Sample]:
 
 
 def mesh(sample: Sample) -> JointMesh:
-    """Mesh a joint at its pad site."""
+    """Return the mesh of a joint at its pad site."""
     return mesh_at(sample.surface, sample.sites).mesh
 
 
 def outcome(sample: Sample) -> dict:
-    """Mesh a joint; return method, errors, quality, attempts and processor seconds, or the reason of refusal.
+    """Mesh a joint and measure the result.
 
     Volume and smallest scaled Jacobian are measured independently of the mesher.
+
+    Returns:
+        ``kind``, ``method`` ("swept", "free-form" or "refused"), errors, ``scaled_jacobian``, ``smallest_length`` [m],
+        reasons of failed attempts ``missed``, and ``seconds`` (processor time); ``reason`` if refused.
     """
     start = time.process_time()
     try:
@@ -85,22 +89,24 @@ def _revolved(generator: np.random.Generator, bulge: tuple[float, float]) -> Clo
 
 
 def barrel(generator: np.random.Generator, number: int) -> ClosedSurface:
+    """Return a random barrel or cylinder, a body of revolution; ``number`` is not used."""
     return _revolved(generator, (0.0, 0.7))
 
 
 def hourglass(generator: np.random.Generator, number: int) -> ClosedSurface:
+    """Return a random hourglass or cylinder, a body of revolution; ``number`` is not used."""
     return _revolved(generator, (-0.5, 0.0))
 
 
 def shifted(generator: np.random.Generator, number: int) -> ClosedSurface:
-    """Return a joint shifted by up to 0.3 radius; every fifth has the full shift."""
+    """Return a random joint shifted by up to 0.3 radius; it has the full shift if ``number`` is a multiple of 5."""
     shift = 0.3 * 0.18 * MM * (1.0 if number % 5 == 0 else generator.uniform())
     angle = generator.uniform(0.0, 2.0 * np.pi)
     return laid_between(_revolved(generator, (-0.3, 0.6)), (shift * np.cos(angle), shift * np.sin(angle)), (0.0, 0.0))
 
 
 def tilted(generator: np.random.Generator, number: int) -> ClosedSurface:
-    """Return a shifted joint tilted by up to 5 degrees; every fifth has the full tilt."""
+    """Return a random shifted joint tilted by up to 5 degrees, the full tilt if ``number`` is a multiple of 5."""
     angles = generator.uniform(0.0, 2.0 * np.pi, 2)
     slope = np.tan(np.radians(5.0 if number % 5 == 0 else generator.uniform(0.0, 5.0)))
     shift = 0.3 * 0.18 * MM * generator.uniform()
@@ -125,17 +131,20 @@ def hooked(generator: np.random.Generator, number: int) -> ClosedSurface:
 
 
 def bridged(generator: np.random.Generator, number: int) -> ClosedSurface:
+    """Return a random pair of joints that a solder bridge connects; ``number`` is not used."""
     gap = 0.31 * MM
     return bridged_pair(gap, 1.0 * MM, generator.uniform(0.3, 0.36) * MM, generator.uniform(0.08, 0.12) * MM)
 
 
 def void(generator: np.random.Generator, number: int) -> ClosedSurface:
+    """Return a random barrel with a spherical void near its middle; ``number`` is not used."""
     whole = _revolved(generator, (0.1, 0.4))
     middle = 0.5 * pad_planes(whole).gap
     return with_void(whole, (*generator.uniform(-0.05, 0.05, 2) * MM, middle), generator.uniform(0.04, 0.07) * MM)
 
 
 def two_voids(generator: np.random.Generator, number: int) -> ClosedSurface:
+    """Return a random barrel with two spherical voids at fixed positions; ``number`` is not used."""
     return with_void(
         with_void(_revolved(generator, (0.2, 0.4)), (0.1 * MM, 0.0, 0.12 * MM), 0.05 * MM),
         (-0.09 * MM, 0.02 * MM, 0.14 * MM),

@@ -11,7 +11,11 @@ import time
 
 
 def run_in_turn(words: list[str]) -> None:
-    """Run inputs in turn, each on the first ranks, while the others sleep."""
+    """Run inputs of the fem program in turn, each on the first ranks, while the others sleep; collective.
+
+    Args:
+        words: Number of ranks and path of each input, alternating.
+    """
     from mpi4py import MPI
 
     from reflowshock.fem.run.program import main

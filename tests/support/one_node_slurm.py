@@ -84,7 +84,7 @@ class OneNode:
 
 @contextmanager
 def one_node_slurm(folder: Path) -> Iterator[OneNode]:
-    """Start a Slurm cluster and stop it at the end.
+    """Start a Slurm cluster of this machine, yield it, and stop it at the end.
 
     Raises:
         NoSlurm: If a program is missing, the user is not root, or a daemon does not start.

@@ -21,7 +21,15 @@ OTHER = Point({}, read_case(SMALL_CASE, ["shock.peak_acceleration=1000 G"]))
 def make(
     store: Store, point: Point, names: Iterable[str], *, content: str = "", findings: Findings | None = None
 ) -> None:
-    """Make products of stages in order, as their jobs do."""
+    """Make products of stages in order, as their jobs do; each file contains its own name.
+
+    Args:
+        store: Store of the products.
+        point: Case with its settings.
+        names: Names of the stages.
+        content: Text appended to the contents of each file.
+        findings: Metrics and checks of each stage; None for none.
+    """
     for name in names:
         store.prepare_work(point, name)
         work = store.work_folder(point, name)
@@ -38,7 +46,7 @@ def make(
 
 
 def record_of(product: Path, **entries: object) -> None:
-    """Seal a product with a record of some entries."""
+    """Create a product's folder and seal it with a record, in which ``entries`` replace or add keys."""
     product.mkdir(parents=True, exist_ok=True)
     entries.pop("sha256", None)
     usual = {"seconds": 1.0, "core_seconds": 1.0, "forecast": 2.0, "metrics": {}, "health": {}, "effects": {}}
@@ -46,7 +54,7 @@ def record_of(product: Path, **entries: object) -> None:
 
 
 def shown_run(folder: Path) -> Store:
-    """Return the store of a run folder that shows all products of the shortened case."""
+    """Make all products of the shortened case in a new run folder, show them there, and return the store."""
     store = Store(folder, one_run=True)
     with lock_folder(store.folder, "run", "small"):
         make(store, POINT, POINT.case.pipeline.names)

@@ -15,12 +15,17 @@ Report = Callable[[float], None]
 
 
 def solve(job: JointReflow, progress: Report):
-    """Return the shape of a joint, and whether it continued."""
+    """Reflow a joint; return its shape, and whether it continued from a checkpoint.
+
+    Args:
+        job: Geometry, solder and checkpoint of the joint.
+        progress: Function called with the fraction done, 0 to 1.
+    """
     return reflow_pool._solve(job, progress)
 
 
 def fail(job: str, progress: Report) -> str:
-    """Fail at one joint, while the other joint sleeps."""
+    """Raise ValueError for the job "fails"; report half of any other job as done and sleep."""
     if job == "fails":
         raise ValueError("no rest after 3 steps")
     progress(0.5)

@@ -94,12 +94,17 @@ class Replayed:
 
 
 def record(channels: InterfaceChannels, rows: NDArray[np.int32]) -> InterfaceChannels:
-    """Return channels that record the messages of a participant; ``rows`` are its local interface nodes."""
+    """Return channels that pass on the messages of a participant and record them.
+
+    Args:
+        channels: Channels of velocities and forces between the models.
+        rows: Local numbers of the participant's interface nodes, shape (k,).
+    """
     return InterfaceChannels(Recorded(channels.velocities, rows), Recorded(channels.forces, rows))
 
 
 def save_recording(channels: InterfaceChannels, path: Path) -> None:
-    """Write the messages of channels of ``record`` (``.npz``)."""
+    """Write the messages that channels of ``record`` have recorded to an NPZ file."""
     arrays = {}
     for name in CHANNELS:
         channel = getattr(channels, name)
@@ -110,6 +115,10 @@ def save_recording(channels: InterfaceChannels, path: Path) -> None:
 
 def replay(path: Path, rows: NDArray[np.int32]) -> InterfaceChannels:
     """Return channels that replay recorded messages to a participant with the same interface nodes.
+
+    Args:
+        path: File of ``save_recording``.
+        rows: Local numbers of the participant's interface nodes, shape (k,).
 
     Raises:
         RecordingError: If the recording is of another interface.

@@ -25,6 +25,13 @@ class HerePool:
 
 
 def joints_here(solder, folder, fail=None):
+    """Return an array of joints that is reflowed in this process.
+
+    Args:
+        solder: Solder of each joint.
+        folder: Folder of the checkpoints.
+        fail: Name of the joint that fails; None for none.
+    """
     return JointArray(solder, folder, HerePool(fail), lambda shares: None)
 
 
@@ -42,7 +49,14 @@ NAMES = ("x", "y", "z", "turn_x", "turn_y", "turn_z")
 
 
 def rigid_modes(centres, names, weight, at=(0.0, 0.0)):
-    """Return the modes of pads at ``centres``, shape (joints, 3): rotations about the origin, weight [N] at x, y."""
+    """Return rigid-body modes of a package: the motions of its pads and the work of its weight.
+
+    Args:
+        centres: Centres of the pads, shape (joints, 3) [m].
+        names: Names of the modes, among ``NAMES``: translations, then rotations about the origin.
+        weight: Weight of the package [N].
+        at: Coordinates x and y at which the weight acts [m].
+    """
     motions, weights, load = [], [], np.array([0.0, 0.0, -weight])
     for name in names:
         number = NAMES.index(name)

@@ -21,7 +21,7 @@ class Rod(Parameters):
 
 
 def stretch(rod: Rod) -> dict[str, Measured]:
-    """Return, fail or hang as the fate of the rod requires."""
+    """Return the metrics ``error`` and ``width`` of a rod, or raise an error, hang or die as its fate requires."""
     if rod.fate == "hangs":
         time.sleep(60.0)
     if rod.fate == "dies":

@@ -18,7 +18,7 @@ ForceScript = Callable[[float, NDArray[np.float64], NDArray[np.float64]], NDArra
 
 
 def scripted_interface(count: int) -> NDArray[np.int32]:
-    """Return the numbers of the interface nodes of a scripted participant, for ``InterfaceChannels.open``."""
+    """Return the numbers 0 to ``count`` - 1 of the interface nodes of a scripted participant, shape (count,)."""
     return np.arange(count, dtype=np.int32)
 
 

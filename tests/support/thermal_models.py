@@ -50,7 +50,15 @@ class Layers:
 def structure_of(
     mesh: MeshData, folder: Path, pads: Pads, materials: Mapping, thermal: Mapping | None = None
 ) -> ThermalStructure:
-    """Return the structure of a mesh with materials by role as in a case."""
+    """Return the thermoelastic structure of a mesh, which is written to a folder.
+
+    Args:
+        mesh: Mesh of board and package.
+        folder: Folder of the mesh file.
+        pads: Names, positions and radii of the pads.
+        materials: Role -> material or its name, as in a case.
+        thermal: Parameters of the heating; None for the defaults.
+    """
     path = folder / "assembly.msh"
     write_msh(mesh, path)
     materials_of_roles = Materials.model_validate(dict(materials))
@@ -59,19 +67,30 @@ def structure_of(
 
 
 def pads_at(places: Sequence[tuple[float, float]], radius: float) -> Pads:
-    """Return pads without copper under layers of ``Layers``."""
+    """Return pads without copper, on the board at z = 0 and under the substrate, named J0, J1, ...
+
+    Args:
+        places: Coordinates x and y of the pads [m].
+        radius: Wetted radius of all pads [m].
+    """
     flat = np.array(places, float)
     centres = np.stack([np.column_stack([flat, np.full(len(flat), height)]) for height in (0.0, LIFT)], axis=1)
     return Pads([f"J{number}" for number in range(len(flat))], centres, np.full((len(flat), 2), radius))
 
 
 def small_pads(radius: float = 0.2e-3) -> Pads:
-    """Return the pads of ``fem_models.small_assembly``, on copper."""
+    """Return the pads of ``fem_models.small_assembly``, on copper, with a wetted radius [m]."""
     centres = [[(x, y, COPPER), (x, y, COPPER + GAP)] for x, y in SITES.values()]
     return Pads(tuple(SITES), np.array(centres), np.full((len(SITES), 2), radius))
 
 
 def small_structure(folder: Path, gravity: float = 9.81, **thermal) -> Assembly:
-    """Write the quarter package on its board of ``fem_models`` with fields of ``Thermal`` as keywords."""
+    """Write the mesh of the quarter package on its board and return the input of its heating.
+
+    Args:
+        folder: Folder of the mesh.
+        gravity: Acceleration of gravity [m/s^2].
+        thermal: Fields of ``Thermal``, the parameters of the heating.
+    """
     mesh = write_small_assembly(folder)[0]
     return Assembly(mesh, small_pads(), ELASTIC, Thermal.model_validate(thermal), gravity)

@@ -9,6 +9,12 @@ from collections.abc import Sequence
 def ask(address: str, words: Sequence[str], streams: Sequence[int], cwd: str | None = None) -> int:
     """Have the server run a module with arguments and standard streams, until it or this process ends.
 
+    Args:
+        address: Path of the server's socket.
+        words: Module and its arguments.
+        streams: File descriptors of standard input, output and error.
+        cwd: Folder in which it runs; None for the present one.
+
     Returns:
         Exit code of the module, or minus the signal that ended it.
     """

@@ -49,7 +49,7 @@ sys.exit(code)
 
 
 def warm_command(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess:
-    """Run a command of the program to its end, equivalent to ``python -m reflowshock``."""
+    """Run a command of the program, as ``python -m reflowshock`` does, to its end; return the completed process."""
     with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err, open(os.devnull) as nothing:
         streams = [file.fileno() for file in (nothing, out, err)]
         code = ask(str(_server() / "socket"), ["reflowshock", *arguments], streams, cwd and str(cwd))
@@ -87,7 +87,12 @@ def _server() -> Path:
 
 
 def serve(client: str, listener: socket.socket) -> None:
-    """Load libraries and plan a case, which loads most of the program; fork for each request until the input ends."""
+    """Load libraries and most of the program; then fork a process for each request until the standard input ends.
+
+    Args:
+        client: Path of the Python that sends the requests.
+        listener: Listening socket.
+    """
     from reflowshock.workflow.process.environment import prepare
 
     prepare()
@@ -117,7 +122,12 @@ def serve(client: str, listener: socket.socket) -> None:
 
 
 def answer(connection: socket.socket, client: str) -> None:
-    """Fork the requested module, end it if the client disconnects, and send its exit code."""
+    """Read a request, fork the module, end it if the client disconnects, and send its exit code; do not return.
+
+    Args:
+        connection: Connection to the client.
+        client: Path of the Python that sent the request.
+    """
     _, streams, _, _ = socket.recv_fds(connection, 1, 3)
     request = json.loads(connection.makefile().readline())
     process = os.fork()
@@ -133,7 +143,13 @@ def answer(connection: socket.socket, client: str) -> None:
 
 
 def become(request: dict, streams: list[int], client: str) -> None:
-    """Run the module of a request in this process, to its end."""
+    """Run the module of a request in this process to its end, and exit with its code.
+
+    Args:
+        request: ``words`` (module and arguments), ``cwd`` and ``environment``.
+        streams: File descriptors of standard input, output and error.
+        client: Path of the Python that sent the request.
+    """
     import numba
 
     os.chdir(request["cwd"])

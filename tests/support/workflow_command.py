@@ -18,6 +18,14 @@ SMALL_CASE = Path(__file__).resolve().parents[1] / "pipeline" / "small.toml"
 
 
 def command_line(command: str, folder: Path, *arguments: str, settings: tuple[str, ...] = ()) -> list[str]:
+    """Return the command line of a command of the program on the shortened case, as words.
+
+    Args:
+        command: Name of the command.
+        folder: Run folder, the value of ``--out``.
+        arguments: Further arguments.
+        settings: Values of ``--set``.
+    """
     overrides = [item for setting in settings for item in ("--set", setting)]
     return [sys.executable, "-m", "reflowshock", command, str(SMALL_CASE), "--out", str(folder), *arguments, *overrides]
 
@@ -25,7 +33,14 @@ def command_line(command: str, folder: Path, *arguments: str, settings: tuple[st
 def reflowshock(
     command: str, folder: Path, *arguments: str, settings: tuple[str, ...] = ()
 ) -> subprocess.CompletedProcess:
-    """Run a command on the shortened case to its end."""
+    """Run a command of the program on the shortened case to its end; return the completed process.
+
+    Args:
+        command: Name of the command.
+        folder: Run folder.
+        arguments: Further arguments.
+        settings: Values of ``--set``.
+    """
     return warm_command(*command_line(command, folder, *arguments, settings=settings)[3:])
 
 
@@ -36,7 +51,7 @@ def times(folder: Path) -> dict[str, int]:
 
 
 def wait_until(condition: Callable[[], bool], seconds: float = 400.0) -> None:
-    """Wait for a condition, long enough for a loaded machine."""
+    """Wait until a function returns True; fail after ``seconds``, long enough for a loaded machine."""
     deadline = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < deadline, "waited too long"
@@ -44,9 +59,16 @@ def wait_until(condition: Callable[[], bool], seconds: float = 400.0) -> None:
 
 
 def break_off(line: list[str], folder: Path, end: signal.Signals, whom: str, *, pattern: str = "*") -> None:
-    """Start a run and signal the "command" or its "stage" as soon as the reflow has a matching checkpoint.
+    """Start a run and send it a signal as soon as the reflow has a matching checkpoint.
 
     The command must fail and leave no child process.
+
+    Args:
+        line: Command line as words.
+        folder: Run folder.
+        end: Signal.
+        whom: Receiver of the signal, "command" or "stage".
+        pattern: Pattern of the name of the checkpoint.
     """
     checkpoints = ".store/work/reflow-*/.reflow.checkpoints"
     process = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE)

@@ -17,6 +17,7 @@ HEAVY = {"dolfinx", "ufl", "numba", "gmsh", "pyvista", "pandas", "scipy", "matpl
 
 
 def run_python(text: str, folder: Path = ROOT) -> subprocess.CompletedProcess:
+    """Run the text of a Python program in a folder; return the completed process."""
     return subprocess.run([sys.executable, "-c", text], cwd=folder, capture_output=True, text=True, check=False)
 
 

@@ -17,6 +17,7 @@ UNPICKLING = {"read_pickle", "to_pickle", "allow_pickle", "eval", "exec"}
 
 
 def run_tool(*arguments: str) -> None:
+    """Run a tool of the development environment with arguments and check that it succeeds."""
     result = subprocess.run(
         [sys.executable, *arguments], cwd=ROOT, capture_output=True, text=True, timeout=300, check=False
     )

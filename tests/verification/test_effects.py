@@ -61,10 +61,12 @@ ON: dict[str, Check] = {}
 
 
 def off(*names: str) -> Callable[[Check], Check]:
+    """Return a decorator that registers a check of effects that are off."""
     return lambda check: [OFF.__setitem__(name, check) for name in names] and check
 
 
 def on(*names: str) -> Callable[[Check], Check]:
+    """Return a decorator that registers a check of effects that are on."""
     return lambda check: [ON.__setitem__(name, check) for name in names] and check
 
 
@@ -229,6 +231,7 @@ def _(_effect, _folder):
 
 
 def terms(material, kinematics="small") -> list:
+    """Return the force terms of a strip of a material."""
     elements = scene.strip()[0].elements
     return force_terms(elements, [material], kinematics, 1e-8)
 

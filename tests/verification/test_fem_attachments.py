@@ -21,6 +21,7 @@ AREA, INERTIA = WIDTH * THICKNESS, WIDTH * THICKNESS**3 / 12
 
 
 def strip(cells: tuple[int, int, int]) -> MeshData:
+    """Return the mesh of a strip, from numbers of elements along x, y and z."""
     x, y = (np.linspace(-0.5, 0.5, n + 1) * side for n, side in zip(cells, (LENGTH, WIDTH), strict=False))
     points, hexahedra = grid(x, y, np.linspace(0.0, THICKNESS, cells[2] + 1))
     sides = {"x_min": on(0, x[0]), "x_max": on(0, x[-1]), "z_min": on(2, 0.0), "z_max": on(2, THICKNESS)}
@@ -28,6 +29,7 @@ def strip(cells: tuple[int, int, int]) -> MeshData:
 
 
 def run(directory: Path, cells: tuple[int, int, int], **changes) -> tuple[dict, dict[str, np.ndarray]]:
+    """Run a strip with changed tables of its input; return its result and its history."""
     structure = {"length": LENGTH, "width": WIDTH, "cells": cells[:2]} | {
         "layers": {"board": {"material": "steel", "thickness": THICKNESS, "cells": cells[2]}}
     }

@@ -18,6 +18,7 @@ RANDOM = np.random.default_rng(3)
 
 
 def distorted_cube() -> tuple[np.ndarray, np.ndarray]:
+    """Return nodes (n, 3) and hexahedra (c, 8) of a unit cube whose inner nodes are moved."""
     points, cells = grid(*[np.linspace(0, 1, 4)] * 3)
     inner = np.all((points > 1e-9) & (points < 1 - 1e-9), axis=1)
     points[inner] += RANDOM.uniform(-0.08, 0.08, (inner.sum(), 3))

@@ -15,10 +15,12 @@ MILLIMETRE = 1e-3
 
 
 def isotropic(young: float, poisson: float = 0.0) -> Material:
+    """Return an elastic material from Young's modulus [Pa] and Poisson's ratio."""
     return Isotropic(density=2000.0, young_modulus=young, poisson_ratio=poisson)
 
 
 def strip(length: float, width: float, height: float, counts: tuple[int, int, int]) -> list[np.ndarray]:
+    """Return the grid lines of a strip along x, y and z, from sizes and element numbers."""
     return [np.linspace(0, size, count + 1) for size, count in zip((length, width, height), counts, strict=True)]
 
 

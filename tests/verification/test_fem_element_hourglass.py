@@ -14,6 +14,7 @@ RANDOM = np.random.default_rng(5)
 
 
 def cube(distortion: float, formulation: str) -> Elements:
+    """Return the elements of a unit cube whose inner nodes are moved by a distortion."""
     points, cells = grid(*[np.linspace(0, 1, 4)] * 3)
     points[np.all((points > 0) & (points < 1), axis=1)] += distortion
     count = len(cells)
@@ -22,6 +23,7 @@ def cube(distortion: float, formulation: str) -> Elements:
 
 
 def energy_of(elements: Elements, displacement: np.ndarray):
+    """Return the energy of elements at a displacement (n, 3), summed over force terms."""
     energies = []
     for term in force_terms(elements, (FR4,)):
         term.add(displacement, np.zeros_like(displacement))

@@ -23,18 +23,22 @@ every_kind = pytest.mark.parametrize("kind", KINDS.values(), ids=KINDS)
 
 
 def inside(points: np.ndarray) -> np.ndarray:
+    """Return whether points are inside the unit cube, shape (n,)."""
     return np.all((points > 1e-9) & (points < 1 - 1e-9), axis=1)
 
 
 def shaken(points: np.ndarray) -> np.ndarray:
+    """Return points of the unit cube with inner ones moved at random, shape (n, 3)."""
     return points + inside(points)[:, None] * RANDOM.uniform(-0.08, 0.08, points.shape)
 
 
 def skewed(points: np.ndarray) -> np.ndarray:
+    """Return points sheared along x in proportion to y, shape (n, 3)."""
     return points + 4.9 * points[:, 1:2] * [1.0, 0.0, 0.0]
 
 
 def internal_force(elements: Elements, displacement: np.ndarray) -> np.ndarray:
+    """Return the internal force of elements at a displacement, shape (n, 3) [N]."""
     force = np.zeros_like(displacement)
     for term in linear_terms(elements):
         term.add(displacement, force)

@@ -16,6 +16,7 @@ CELLS = (16, 4, 2)
 
 
 def history(directory: Path, name: str) -> dict[str, np.ndarray]:
+    """Run a clamped strip of a kind of element in a folder; return its history."""
     kind = KINDS[name]
     low, high = np.array([-LENGTH / 2, -WIDTH / 2, 0.0]), np.array([LENGTH / 2, WIDTH / 2, THICKNESS])
     lines = [np.linspace(*ends, count + 1) for *ends, count in zip(low, high, CELLS, strict=True)]
@@ -35,6 +36,7 @@ def history(directory: Path, name: str) -> dict[str, np.ndarray]:
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory) -> dict[str, dict[str, np.ndarray]]:
+    """Return kind of element -> history of the strip."""
     return {name: history(tmp_path_factory.mktemp("strip") / name, name) for name in KINDS}
 
 

@@ -37,6 +37,7 @@ def bent(points: np.ndarray, middle: float) -> np.ndarray:
 
 
 def strains_of(mesh: MeshData, displacement: np.ndarray, symmetry: tuple[str, ...] = (), **gauges) -> dict[str, float]:
+    """Return the strain of each gauge on a mesh at a displacement (n, 3) [m], by name."""
     fittings = TypeAdapter(Fittings).validate_python({"gauges": gauges})
     table = fitted(mesh, fittings, symmetry, np.empty(0, np.int32), yields=False).points.gauges
     stretches = np.zeros((len(table.names), 3))
@@ -126,6 +127,7 @@ PEAK, PULSE, END = 14709.975, 5e-5, 1e-4
 
 
 def outputs_of(folder: Path) -> tuple[dict, dict[str, np.ndarray]]:
+    """Return result and history in a folder."""
     with np.load(folder / "history.npz") as arrays:
         return json.loads((folder / "result.json").read_text()), dict(arrays)
 

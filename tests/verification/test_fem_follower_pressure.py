@@ -18,12 +18,14 @@ SIDES = {f"{'xyz'[axis]}_{end}": on(axis, level) for axis in range(3) for end, l
 
 
 def cube() -> MeshData:
+    """Return the mesh of a cube of 1 mm with facet sets on its sides."""
     ticks = np.linspace(0.0, 1e-3, 3)
     points, cells = grid(ticks, ticks, ticks)
     return mesh_of(points, cells, "board", SIDES)
 
 
 def pressed(names) -> tuple[MeshData, ExplicitMotion, list[FollowerPressure]]:
+    """Return mesh, motion and loads of a cube under pressure on some facet sets."""
     mesh = cube()
     body, critical = dns_body(mesh, STEEL)
     loads = [FollowerPressure.build(body, outward_facets(mesh, name), Constant(PRESSURE)) for name in names]
@@ -31,6 +33,7 @@ def pressed(names) -> tuple[MeshData, ExplicitMotion, list[FollowerPressure]]:
 
 
 def force_of(load, motion: ExplicitMotion) -> np.ndarray:
+    """Return the force that a load adds to a motion, shape (n, 3) [N]."""
     before = motion.force.copy()
     load.add(motion)
     return motion.force - before

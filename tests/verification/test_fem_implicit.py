@@ -34,10 +34,12 @@ def spring() -> tuple[Body, float]:
 
 
 def implicit(body: Body, step: float, alpha: float = 0.0, loads=()) -> ImplicitMotion:
+    """Return the implicit motion of a body at rest, with HHT parameter alpha."""
     return ImplicitMotion(MPI.COMM_SELF, body, loads, step, alpha)
 
 
 def run(motion, steps: int):
+    """Take a number of steps of a motion, in place, and return it."""
     for _ in range(steps):
         motion.advance()
         motion.update_force()
@@ -93,6 +95,7 @@ def test_free_vibration_follows_the_amplification_matrix(spring, alpha, phase):
 
 
 def total_energy(motion) -> float:
+    """Return kinetic and internal energy of a motion [J]."""
     return motion.kinetic_energy() + motion.internal_energy().total
 
 

@@ -22,6 +22,7 @@ KINDS = ["pressure", "motion", "large_mass", "damped"]
 
 
 def model(kind: str) -> tuple[Body, MeshData, float]:
+    """Return body, mesh and critical step [s] of a bar, held if it is damped."""
     mesh = bar(held=kind == "damped")
     body, critical = dns_body(mesh, STEEL)
     return body, mesh, critical
@@ -38,6 +39,7 @@ def test_energy_is_exact(kind, fraction, alpha):
 
 
 def run(motion: Motion, end: float) -> Motion:
+    """Advance a motion to an end time [s], in place, and return it."""
     while motion.time < end - 0.5 * motion.step:
         motion.advance()
         motion.update_force()
@@ -45,6 +47,7 @@ def run(motion: Motion, end: float) -> Motion:
 
 
 def shape_of(motion: Motion) -> np.ndarray:
+    """Return the displacement relative to the base, shape (n, 3) [m]."""
     return motion.displacement - motion.base_displacement()
 
 

@@ -21,6 +21,7 @@ def measures(mesh, turned=None):
 
 @pytest.fixture(scope="module")
 def imprinted():
+    """Return the measures of the joint with imprinted pads."""
     return measures(IMPRINTED)
 
 

@@ -49,15 +49,18 @@ def largest_imbalance(motion: ExplicitMotion, steps: int) -> tuple[float, float]
 
 
 def pressure(body: Body, mesh: MeshData, pulse) -> NodalForces:
+    """Return the load of a pressure on the facet set ``high``, times a pulse."""
     nodes, areas = outward_areas(mesh, "high")
     return NodalForces.build(body, nodes, -areas, pulse)
 
 
 def low_nodes(body: Body, mesh: MeshData) -> np.ndarray:
+    """Return the local numbers of the nodes of the facet set ``low``."""
     return body.local.locate(mesh.facet_nodes("low"))
 
 
 def loads_of(kind: str, body: Body, mesh: MeshData, stiffness: float) -> list[Load]:
+    """Return the loads of a kind of test on a bar."""
     pulse = HalfSine(1e4, 2 * LENGTH / SPEED)
     if kind == "pressure":
         return [pressure(body, mesh, Constant(1e6)), BodyAcceleration(ALONG, Constant(9.81))]

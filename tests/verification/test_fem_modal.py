@@ -19,14 +19,17 @@ WIDTH = 0.1
 
 
 def equations(body: Body) -> Equations:
+    """Return the equations of a body on one rank."""
     return Equations.of(MPI.COMM_SELF, body)
 
 
 def frequencies(body: Body, count: int) -> np.ndarray:
+    """Return the lowest natural frequencies of a body, shape (count,) [Hz]."""
     return natural_modes(equations(body), count).frequency
 
 
 def held_bar(elements: int, held_at_end: tuple[int, ...]) -> Body:
+    """Return a bar with some displacement components held at its end."""
     body, _ = dns_body(bar(WIDTH, elements, 1e-3), STEEL)
     end = body.local.points[:, 0] < 1e-9
     body.free[np.ix_(end, held_at_end)] = False
@@ -79,6 +82,7 @@ def test_clamped_square_plate():
 
 @pytest.fixture(scope="module")
 def free_body() -> Body:
+    """Return a bar without supports."""
     points, cells = grid(np.linspace(0, WIDTH, 21), np.linspace(0, 0.01, 3), np.linspace(0, 2e-3, 3))
     return dns_body(mesh_of(points, cells, "board", {}), STEEL)[0]
 

@@ -70,6 +70,7 @@ def test_velocity_step_travels_at_the_wave_speed_and_keeps_its_height():
 
 
 def bar_with_wall(elements: int) -> MeshData:
+    """Return the mesh of a bar whose end x = 0 is a plane of symmetry."""
     points, cells = grid(np.linspace(0, LENGTH, elements + 1), [0, 2e-3], [0, 2e-3])
     return mesh_of(points, cells, "board", {"symmetry_x": on(0, 0.0)})
 

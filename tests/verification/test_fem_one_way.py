@@ -33,6 +33,7 @@ def driver_of(models: Models) -> tuple[RankElements, Tables]:
 
 
 def nearest(points: np.ndarray, targets: np.ndarray) -> np.ndarray:
+    """Return the number of the point nearest to each target, shape (k,)."""
     return np.array([np.argmin(np.linalg.norm(points - point, axis=1)) for point in targets])
 
 

@@ -30,6 +30,7 @@ def quarter_board() -> MeshData:
 
 
 def drop(directory: Path, solver: str) -> tuple[dict, Path]:
+    """Run the board with a solver; return its result and the path of its history."""
     directory.mkdir()
     request = structure_input(
         directory,

@@ -13,6 +13,7 @@ RANDOM = np.random.default_rng(11)
 
 
 def solder(temperature: float = 298.15, **law: float) -> Isotropic:
+    """Return plastic solder at a temperature [K]; ``law`` replaces constants of Johnson and Cook."""
     plasticity = JohnsonCook(**({"A": 38e6, "B": 275e6, "n": 0.71, "C": 0.0713, "reference_rate": 1e-3} | law))
     return Isotropic(
         density=7400.0, young_modulus=50e9, poisson_ratio=0.36, plasticity=plasticity, temperature=temperature

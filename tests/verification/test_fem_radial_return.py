@@ -14,10 +14,12 @@ ORDER = (0.93, 1.07)
 
 
 def solder(**law: float) -> Isotropic:
+    """Return plastic solder with constants of Johnson and Cook."""
     return Isotropic(density=7400.0, young_modulus=50e9, poisson_ratio=0.36, plasticity=JohnsonCook(**law))
 
 
 def mises(deviator: np.ndarray) -> float:
+    """Return the Mises stress of a stress deviator, shape (3, 3) [Pa]."""
     return float(np.sqrt(1.5) * np.linalg.norm(deviator))
 
 
@@ -96,6 +98,7 @@ def test_constant_plastic_rate_with_hardening_equals_the_integrated_rate_equatio
 
 
 def order(steps: list[int], errors: list[float]) -> float:
+    """Return the order of errors in 1 / steps, fitted."""
     return float(np.polyfit(np.log(1.0 / np.array(steps)), np.log(errors), 1)[0])
 
 

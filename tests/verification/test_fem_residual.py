@@ -18,6 +18,7 @@ CHANGE = -192.0
 
 
 def metal(young: float, expansion: float, poisson: float = 0.0, plasticity: JohnsonCook | None = None) -> Isotropic:
+    """Return a metal from Young's modulus [Pa], expansion [1/K], Poisson's ratio and plasticity."""
     return Isotropic(
         density=8000.0, young_modulus=young, poisson_ratio=poisson, thermal_expansion=expansion, plasticity=plasticity
     )

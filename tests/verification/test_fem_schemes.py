@@ -16,12 +16,14 @@ OF_TWO_STEPS = [name for name, coupling in SCHEMES.items() if coupling.scheme !=
 
 
 def pushed(scheme: str, pair: Pair, fraction: float = 0.9) -> Coupled:
+    """Return a pair of models coupled by a scheme, after a push."""
     coupled = pair.coupled(SCHEMES[scheme], fraction)
     coupled.swing(PUSH)
     return coupled
 
 
 def twins(points: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Return the number of the node in ``others`` nearest to each point, shape (n,)."""
     return np.array([np.argmin(np.linalg.norm(others - point, axis=1)) for point in points])
 
 

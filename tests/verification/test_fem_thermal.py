@@ -50,6 +50,7 @@ def lower_face(structure, width: float = 0.0) -> np.ndarray:
 
 
 def heated(structure, rise: float = RISE):
+    """Return the solution of a structure heated by a rise of temperature [K]."""
     modes = structure.rigid_modes
     return structure.solve(REFERENCE + rise, 0.0, np.zeros(modes.pad_motion.shape[1:]), np.zeros(len(modes.names)))
 
@@ -72,6 +73,7 @@ def test_free_orthotropic_expansion_is_exact_on_any_shapes(tmp_path, planes):
 
 
 def strip(tmp_path: Path, cells: tuple[int, int, int, int], ratio: float = 0.0):
+    """Return the structure of a bilayer strip and its exact curvature."""
     layers = Layers(10e-3, 1e-3, (0.4e-3, 0.25e-3), cells)
     soft, stiff = (material.model_copy(update={"poisson_ratio": ratio}) for material in (SOFT, STIFF))
     materials = {"substrate": soft, "die": stiff}

@@ -60,6 +60,7 @@ def test_wave_through_a_change_of_impedance(ratio):
 
 
 def box(held: bool) -> MeshData:
+    """Return the mesh of a bar of 6 mm, held by symmetry at x = 0 or free."""
     points, cells = grid(np.linspace(0, 6e-3, 7), [0, 1e-3], [0, 1e-3])
     facets = {"symmetry_x": on(0, 0.0)} if held else {}
     return mesh_of(points, cells, "board", facets | {"low": on(0, 0.0), "high": on(0, 6e-3)})
@@ -69,6 +70,7 @@ LOADS = ("direct", "large_mass", "pressure", "motion", "damping")
 
 
 def loads_of(kind: str, body, mesh: MeshData, duration: float) -> list[Load]:
+    """Return the loads of a kind of test on a bar, with pulses within a duration [s]."""
     pulse = HalfSine(1e4, 0.6 * duration)
     low = mesh.facet_nodes("low")
     if kind == "direct":

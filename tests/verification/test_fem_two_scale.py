@@ -19,6 +19,7 @@ THICK_COPPER = Materials(copper=HEAVY)
 
 
 def board_only() -> MeshData:
+    """Return the mesh of a quarter board with elements of 1 mm."""
     return board_mesh(size=1e-3)
 
 

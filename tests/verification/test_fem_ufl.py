@@ -26,6 +26,7 @@ IDENTITY = ufl.Identity(3)
 
 
 def distorted(name: str, material, seed: int = 0, cells: int = 2) -> Elements:
+    """Return the elements of a small distorted cube, of a named kind and a material."""
     random, line = np.random.default_rng(seed), np.linspace(0, 1e-3, cells + 1)
     points, cells = box(
         KINDS[name], line, line, line, move=lambda points: points + random.uniform(-3e-5, 3e-5, points.shape)
@@ -34,10 +35,12 @@ def distorted(name: str, material, seed: int = 0, cells: int = 2) -> Elements:
 
 
 def term_of(elements: Elements, law: Law) -> UflElements:
+    """Return the force term of all elements with a law in UFL."""
     return UflElements(elements, np.arange(len(elements.cells)), law)
 
 
 def linear(matrix: np.ndarray) -> Law:
+    """Return the law of linear elasticity with a stiffness matrix, shape (6, 6) [Pa]."""
     constants = ufl.as_matrix(matrix.tolist())
 
     def energy(gradient, _):
@@ -49,6 +52,8 @@ def linear(matrix: np.ndarray) -> Law:
 
 
 def neo_hookean() -> Law:
+    """Return the law of a compressible neo-Hookean material."""
+
     def energy(gradient, _):
         deformation = IDENTITY + gradient
         log_volume = ufl.ln(ufl.det(deformation))

@@ -55,6 +55,7 @@ def answer(solder: Solder) -> Answer:
 
 
 def swept(core: int, rings: int, layers: int) -> Answer:
+    """Return the answer of a column of swept hexahedra, from its mesh settings."""
     return answer(swept_solder(COLUMN, JointNumerics(core=core, rings=rings, layers=layers), np.asarray))
 
 

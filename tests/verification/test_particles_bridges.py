@@ -20,6 +20,7 @@ ON = {"surface_tension": True, "gravity": False, "wall_adhesion": True, "viscosi
 
 
 def check_energy_falls(energy):
+    """Check that the energy never rises by more than 1e-4 of its start."""
     assert np.diff(energy).max() < 1e-4 * abs(energy[0])
 
 

@@ -11,6 +11,7 @@ WATER = Fluid(density=1000.0, surface_tension=0.072, viscosity=1e-3, numerics={"
 
 
 def at_rest(fluid, **drop):
+    """Return the shape of a drop at rest, from a fluid and fields of ``Drop``."""
     drop = Drop(**drop)
     return drop_to_rest(drop, fluid.resolve(drop, "auto")).shape
 

@@ -16,10 +16,12 @@ SOLDER = {"diameter": 78e-6, "density": 8150.0, "surface_tension": 0.55}
 
 
 def ink(across, duration, **changes):
+    """Return a droplet of ink, from particles across the diameter and duration [s]."""
     return Droplet(**INK | changes, duration=duration, numerics=DropletNumerics(particles_per_diameter=across))
 
 
 def value(result, name):
+    """Return the value of a metric of a result."""
     return result.metrics[name][0]
 
 
@@ -32,6 +34,7 @@ def test_pressure_of_a_free_drop_equals_young_laplace(diameter, tension):
 
 
 def assert_cap(scene, slack):
+    """Check base and height of a droplet at rest against the exact cap."""
     result = solve_droplet(scene)
     assert abs(value(result, "base_error")) < slack
     assert abs(value(result, "height_error")) < slack

@@ -21,11 +21,13 @@ FREE = ON | {"wall_adhesion": False}
 
 
 def start_on_wall(cloud, solder):
+    """Return the flow of a cloud that wets a wall, at time 0."""
     lines = tuple(contact_line(cloud, wall, inf, solder) for wall in range(len(cloud.rings)))
     return start_flow(cloud, solder, ON, lines)
 
 
 def cubes_on_a_wall(edges, centres, count, solder):
+    """Return flows of cubes on a wall, from edges and centres along x [m]."""
     flows = []
     for edge, centre in zip(edges, centres, strict=True):
         flow = start_on_wall(box_cloud(edge, count), solder)
@@ -35,14 +37,17 @@ def cubes_on_a_wall(edges, centres, count, solder):
 
 
 def solder_of(spacing):
+    """Return solder with a particle spacing [m]."""
     return Solder(volume=1e-9, pad_contact_angle=ANGLE, numerics=SolderNumerics(spacing=spacing, max_steps=600))
 
 
 def centre(body):
+    """Return the centre of volume of a body, shape (3,) [m]."""
     return centre_of_volume(body.points, body.triangles)
 
 
 def touching_balls(radii, solder):
+    """Return flows of balls in a row along x that touch, from their radii [m]."""
     spacing, flows, left_end = solder.numerics.spacing, [], 0.0
     for radius in radii:
         volume = 4.0 / 3.0 * np.pi * radius**3

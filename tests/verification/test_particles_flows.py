@@ -20,6 +20,7 @@ from reflowshock.particles.sph_flows.viscous_flows import channel, solve_poiseui
 
 
 def value(result, name):
+    """Return the value of a metric of a result."""
     return result.metrics[name][0]
 
 
@@ -53,6 +54,7 @@ CARREAU = {"law": "carreau", "exponent": 0.4, "shear_rate": 10.0, "viscosity_at_
 
 
 def steady_speeds(height, scene):
+    """Return the exact steady speeds of a channel at heights [m], shape (n,) [m/s]."""
     return exact_speeds(height, 0.0, scene)
 
 
@@ -142,6 +144,7 @@ def test_density_diffusion_removes_pressure_noise():
 
 
 def dam_break(across, duration):
+    """Return the result of a dam break, from particles across and duration [sqrt(H / g)]."""
     numerics = SphNumerics(particles_across=across)
     parameters = {"height": 0.6, "width": 1.2, "tank_length": 3.22, "sensor_height": 0.12}
     return solve_dam_break(DamBreak(**parameters, duration=duration * sqrt(0.6 / 9.81), numerics=numerics))

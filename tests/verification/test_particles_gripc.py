@@ -45,6 +45,7 @@ def poisson_error(basis, count):
 
 
 def poisson_order(basis):
+    """Return the order of the Poisson solution in the spacing, and its errors."""
     errors = [poisson_error(basis, count) for count in COUNTS]
     return np.polyfit(np.log(1.0 / (np.array(COUNTS) - 1)), np.log(errors), 1)[0], errors
 

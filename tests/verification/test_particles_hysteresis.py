@@ -23,11 +23,13 @@ EFFECTS = {"surface_tension": True, "gravity": False, "wall_adhesion": True, "vi
 
 
 def base_radius(volume, angle):
+    """Return the base radius of a cap [m], from volume [m^3] and contact angle [rad]."""
     return cap_radius(volume, angle) * np.sin(angle)
 
 
 @pytest.fixture(scope="module")
 def flow():
+    """Return the flow of a cube on a wall with hysteresis, and its solder."""
     cloud = box_cloud(np.cbrt(VOLUME), 8)
     solder = Solder(volume=VOLUME, numerics=SolderNumerics(spacing=cloud.spacing, max_steps=2000))
     return start_flow(
@@ -76,6 +78,7 @@ def moving(viscosity, **changes):
 
 @pytest.fixture(scope="module")
 def half_sphere():
+    """Return a drop at rest with a contact angle of 90 degrees."""
     drop = Drop(volume=VOLUME, contact_angle=0.5 * np.pi, particles_per_edge=COUNT)
     return flow_to_rest(drop, moving(0.227, pad_contact_angle=0.5 * np.pi))[0].body
 

@@ -45,10 +45,12 @@ def solder(scheme="ispg", wall="free-slip", spacing=SPACING):
 
 
 def named(shape):
+    """Return the metrics of a shape, name -> value."""
     return {name: value for name, (value, _) in shape.metrics.items()}
 
 
 def place(standoff, offset=0.0, degrees=0.0):
+    """Return the geometry of a joint, from standoff and offset [m] and tilt [degrees]."""
     return JointGeometry(standoff, RADIUS, RADIUS, (offset, 0.0), (0.0, np.radians(degrees)))
 
 
@@ -104,6 +106,7 @@ def test_a_moved_joint_rests_where_the_default_does(end, wall):
 
 
 def joint(spacing=SPACING, **table):
+    """Return the scene of a joint; ``table`` adds keys."""
     return Joint(volume=VOLUME, pad_bottom=RADIUS, pad_top=RADIUS, standoff=0.35e-3, spacing=spacing, **table)
 
 

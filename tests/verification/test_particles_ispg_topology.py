@@ -25,6 +25,7 @@ def fluid(parameters):
 
 
 def named(shape):
+    """Return the metrics of a shape, name -> value."""
     return {name: value for name, (value, _) in shape.metrics.items()}
 
 

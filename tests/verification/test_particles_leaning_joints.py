@@ -9,7 +9,7 @@ import pytest
 from reflowshock.particles.core.geometry import LARGEST_WIDTH_CHANGE, JointGeometry
 from reflowshock.particles.parameters.solder import Solder, SolderNumerics
 from reflowshock.particles.reference.young_laplace import joint_meridian
-from reflowshock.particles.scenes.metrics import width_change_bound
+from reflowshock.particles.scenes.reference_shapes import width_change_bound
 from reflowshock.particles.scenes.reflow import solve_joint
 
 REFERENCE = json.loads((Path(__file__).parent / "references" / "surface_evolver.json").read_text())["leaning_joints"]

@@ -29,6 +29,7 @@ def relative_errors(basis, count, seed=13):
 
 
 def orders(basis):
+    """Return the orders of gradient and Laplacian in the spacing, and their errors."""
     errors = np.array([relative_errors(basis, count) for count in COUNTS])
     return np.polyfit(np.log(1.0 / (np.array(COUNTS) - 1)), np.log(errors), 1)[0], errors
 

@@ -20,6 +20,7 @@ PULL = np.pi * RADIUS * GAMMA
 
 
 def weightless(volume, spacing):
+    """Return solder without gravity, from volume [m^3] and spacing [m]."""
     numerics = SolderNumerics(spacing=spacing, time_step_limit=100)
     return Solder(volume=volume, effects=SolderEffects(gravity="off"), numerics=numerics)
 
@@ -48,6 +49,7 @@ def test_axial_force_between_bulge_and_hourglass(gap):
 
 
 def place(which, value):
+    """Return the geometry of a joint with a changed gap, offset or tilt."""
     if which == "gap":
         return JointGeometry(GAP + RADIUS * value, RADIUS, RADIUS)
     if which == "offset":

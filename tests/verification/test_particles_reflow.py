@@ -16,6 +16,7 @@ WEIGHT = 8930.0 * 9.81
 
 
 def error(actual, expected):
+    """Return the relative error of a value."""
     return actual / expected - 1.0
 
 

@@ -12,6 +12,7 @@ EFFECTS = {"surface_tension": True, "wall_adhesion": True, "gravity": False, "in
 
 
 def cube(degrees: float, count: int) -> LiquidFlow:
+    """Return the flow of a cube on a wall, from contact angle [degrees] and particles per edge."""
     solder = Solder(
         volume=1e-9,
         pad_contact_angle=np.radians(degrees),

@@ -19,6 +19,7 @@ SCENES = {
 
 @cache
 def metrics(name, symmetry):
+    """Return the metrics of a drop at rest, computed in full, half or quarter."""
     scene, gravity = SCENES[name]
     drop = Drop(symmetry=symmetry, **scene)
     shape = drop_to_rest(drop, Fluid().resolve(drop, gravity)).shape

@@ -50,6 +50,7 @@ def cylinder(spacing):
 
 
 def physics(condition, *, inertia, spins):
+    """Return the physics of a viscous liquid with a wall condition, and turning plates."""
     operators, momenta = [Viscosity(VISCOSITY), Mass(DENSITY)], []
     if inertia:
         momenta = [Inertia(DENSITY)]

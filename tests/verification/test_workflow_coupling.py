@@ -24,6 +24,7 @@ PULL = np.pi * RADIUS * GAMMA
 
 
 def coupled(folder, structure, steps=(300.0,), *, rigid=0.0, bends=True, fail=None, solder=SOLDER):  # noqa: PLR0913
+    """Return the equilibrium of solder and structure at each step, computed in a folder."""
     centres, modes = structure.centres, structure.rigid_modes
     drawn = {f"J{number}": JointGeometry(GAP, RADIUS, RADIUS) for number in range(len(centres))}
     geometries = list(drawn.values())
@@ -39,6 +40,8 @@ def coupled(folder, structure, steps=(300.0,), *, rigid=0.0, bends=True, fail=No
 
 
 def exact_height(load):
+    """Return the gap at which a joint carries a load [N], by Young-Laplace [m]."""
+
     def force(gap):
         return joint_meridian(BALL, RADIUS, RADIUS, gap, GAMMA).axial_force
 

@@ -14,6 +14,7 @@ HEIGHTS = [0.03, 0.05, 0.15]
 
 
 def pulse(time: np.ndarray, middle: float) -> np.ndarray:
+    """Return a half sine about a middle time [s], shaped as ``time``."""
     phase = (time - middle) / BARS.pulse + 0.5
     return np.where((phase > 0.0) & (phase < 1.0), np.sin(np.pi * phase), 0.0)
 

@@ -15,6 +15,7 @@ MATERIALS = np.array([elasticity_matrix(FR4), elasticity_matrix(SAC405)])
 
 
 def elements_of(points: np.ndarray, cells: np.ndarray, formulation: str = "incompatible_modes") -> Elements:
+    """Return elements of two materials, assigned at random."""
     random = np.random.default_rng(len(cells))
     material = random.integers(0, 2, len(cells)).astype(np.int32)
     return Elements(points, cells, material, MATERIALS, np.ones(len(cells)), element_kind(8, formulation))
@@ -29,6 +30,7 @@ def force_twin(elements: Elements, displacement: np.ndarray) -> np.ndarray:
 
 
 def assert_same_force(elements: Elements) -> CongruentElements:
+    """Check the force of elements in rows against the sum over elements; return the term."""
     displacement = np.random.default_rng(1).uniform(-1, 1, elements.points.shape)
     term = CongruentElements.build(elements)
     exact = force_twin(elements, displacement)

@@ -56,6 +56,7 @@ def write_box(path, shape, mixed=False, spoil=None) -> None:
 
 @pytest.fixture(params=SHAPES, ids=lambda shape: shape.name)
 def box(request, tmp_path):
+    """Return the mesh of a box of one cell shape."""
     write_box(tmp_path / "box.msh", request.param)
     mesh = read_mesh(tmp_path / "box.msh")
     assert mesh.shape is request.param

@@ -24,6 +24,7 @@ class Killed(Exception):
 
 
 def state(window: int) -> dict:
+    """Return the state of two models after a number of windows."""
     points = np.full((3, 3), float(window))
     return {
         "macro": {"displacement": Rows(NODES, points), "force": Shares(NODES, points, NODES > 4), "work": Sum(0.5)},
@@ -32,6 +33,7 @@ def state(window: int) -> dict:
 
 
 def checkpoints(folder) -> Checkpoints:
+    """Return the checkpoints in a folder, on this process."""
     return Checkpoints(MPI.COMM_SELF, folder, "inputs", 0.0)
 
 
@@ -46,11 +48,13 @@ def written(folder) -> Checkpoints:
 
 
 def damage_files(folder, pattern, damage, marker) -> None:
+    """Damage the only file in a folder that matches a pattern."""
     (path,) = folder.glob(pattern)
     path.write_bytes(damage(path.read_bytes(), marker))
 
 
 def warnings(said: str) -> list[str]:
+    """Return the warnings among the lines of an output."""
     return [json.loads(line)["warning"] for line in said.splitlines() if line.startswith('{"warning"')]
 
 

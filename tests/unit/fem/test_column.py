@@ -20,6 +20,7 @@ GRADIENT = 1e-3 * np.array([[1.0, -0.4, 0.7], [0.3, -0.8, 0.2], [-0.6, 0.9, 0.5]
 
 @pytest.fixture(scope="module")
 def whole():
+    """Return the joined mesh of a joint in columns."""
     return patch(IMPRINTED)[0]
 
 

@@ -62,6 +62,7 @@ def term_of(kind):
 
 
 def force_of(term, displacement: np.ndarray) -> np.ndarray:
+    """Return the force of a term at a displacement, shape (n, 3) [N]."""
     force = np.zeros_like(displacement)
     term.add(displacement, force)
     return force
@@ -86,6 +87,7 @@ def local_energy(elements: Elements, displacement: np.ndarray) -> float:
 
 
 def gently(elements: Elements, size: float, seed: int = 0) -> np.ndarray:
+    """Return small random displacements of the nodes of elements, shape (n, 3) [m]."""
     return size * 1e-4 * np.random.default_rng(seed).uniform(-1, 1, elements.points.shape)
 
 

@@ -23,14 +23,17 @@ ELASTIC, YIELDING = ELASTIC, Materials(solder=SAC305)
 
 @pytest.fixture(scope="module")
 def mesh():
+    """Return the mesh of the small package."""
     return append(small_assembly())
 
 
 def scene(mesh, materials=ELASTIC, **coupling):
+    """Return joined mesh, survey and rules of a mesh under a coupling."""
     return surveyed(mesh, materials, coupling=Coupling(**coupling))
 
 
 def refused(parts, division, words):
+    """Check that a division is rejected with some words."""
     with pytest.raises(CouplingError, match=words):
         check_division(parts[0], parts[1], division, parts[2])
 

@@ -29,6 +29,7 @@ def corners_of(kind, distortion=0.15) -> np.ndarray:
 
 
 def elements_of(kind, corners) -> Elements:
+    """Return two separate elements of a kind, from corners, shape (2, nodes, 3) [m]."""
     cells = np.arange(2 * kind.nodes, dtype=np.int32).reshape(2, -1)
     return Elements(corners.reshape(-1, 3), cells, MATERIAL, ELASTICITY, np.full(2, 2.0), kind)
 

@@ -13,6 +13,7 @@ from tests.support.fem_structures import structure_input
 
 
 def steps_of(directory, **numerics):
+    """Return the steps of the clamped strip with changed numerics."""
     request = structure_input(directory, dynamics={"duration": 8e-5, "numerics": {"history_samples": 40} | numerics})
     return build_structure(MPI.COMM_SELF, request, [])[1]
 

@@ -26,10 +26,12 @@ def coarse_joints(names=tuple(SITES)):
 
 @pytest.fixture(scope="module")
 def mesh():
+    """Return the mesh of the small package."""
     return append(small_assembly())
 
 
 def cells_of(mesh, part):
+    """Return the number of cells of a part."""
     return int(mesh.in_parts(part.__eq__).sum())
 
 

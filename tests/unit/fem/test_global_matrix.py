@@ -16,10 +16,12 @@ from tests.support.fem_models import bar, small_assembly
 
 @pytest.fixture(scope="module")
 def tied() -> Body:
+    """Return the small package as one body with ties."""
     return dns_body(append(small_assembly(1, size=1e-3)), materials=ELASTIC)[0]
 
 
 def random_field(body: Body, seed: int) -> np.ndarray:
+    """Return random displacements that supports and ties admit, shape (n, 3)."""
     field = np.zeros_like(body.local.points)
     field[body.free] = np.random.default_rng(seed).normal(size=body.free.sum())
     body.tie.spread(field)

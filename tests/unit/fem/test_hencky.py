@@ -35,6 +35,7 @@ def twin(strain: np.ndarray, material: Isotropic) -> tuple[np.ndarray, float]:
 
 
 def at_point(strain: np.ndarray, material: Isotropic) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return stress (6,), tangent (6, 6) and plastic strain at a strain (6,)."""
     stress, tangent = np.empty(6), np.empty((6, 6))
     plastic = hencky(strain, PointLaw(elasticity_matrix(material), plastic_constants(material)), stress, tangent)
     return stress, tangent, plastic

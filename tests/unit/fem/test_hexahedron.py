@@ -17,10 +17,12 @@ RANDOM = np.random.default_rng(7)
 
 
 def one_element(distortion: float, size=(1.0, 1.0, 1.0)) -> np.ndarray:
+    """Return the corners of a box distorted at random, shape (8, 3) [m]."""
     return 0.5 * SIDES * size + distortion * RANDOM.uniform(-1, 1, (8, 3)) * size
 
 
 def elements_of(points, cells, material=FR4) -> Elements:
+    """Return hexahedra with incompatible modes of one material."""
     return Elements(
         np.ascontiguousarray(points),
         np.asarray(cells, np.int32),
@@ -31,6 +33,7 @@ def elements_of(points, cells, material=FR4) -> Elements:
 
 
 def strain_matrix(gradient: np.ndarray) -> np.ndarray:
+    """Return the strain matrix of shape function gradients (k, 3), shape (6, 3 k)."""
     columns = []
     for x, y, z in gradient:
         columns.append([[x, 0, 0], [0, y, 0], [0, 0, z], [y, x, 0], [0, z, y], [z, 0, x]])

@@ -24,11 +24,13 @@ LAYERS = {"board": [1.5e-4, 1.5e-4], "solder": [1e-4, 1e-4], "die": [2e-4]}
 
 
 def package(formulation: str = "one_point", kinematics: str = "small", materials: dict | None = None) -> Cooled:
+    """Return a distorted package of layers after cooling."""
     mesh = layered(np.linspace(0, 1e-3, 4), np.linspace(0, 7e-4, 3), LAYERS, distorted=0.15)
     return cooled(mesh, materials or MATERIALS, CHANGE, formulation, ForceOptions(kinematics, 1e-9))
 
 
 def force_at_rest(body: Body) -> np.ndarray:
+    """Return the force of a body at rest on free components, shape (n, 3) [N]."""
     force = np.zeros((len(body.mass), 3))
     for term in body.terms:
         term.add(np.zeros_like(force), force)
@@ -51,6 +53,7 @@ def test_nothing_moves_without_a_shock(formulation, kinematics):
 
 
 def launched(body: Body, step: float) -> ExplicitMotion:
+    """Return a damped motion of a body with an initial velocity."""
     motion = motion_of(body, step, [RayleighDamping.build(body, 0.0, 0.01 * step)])
     motion.launch(np.array([0.0, 0.1, 1.0]))
     return motion

@@ -32,12 +32,14 @@ SHOCK = {
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory) -> Path:
+    """Return a folder with the meshes of the small package."""
     directory = tmp_path_factory.mktemp("interface")
     write_small_assembly(directory)
     return directory
 
 
 def results(files: Path, name: str, mode: str, numerics: dict | None = None, **changes) -> Path:
+    """Run a mode with changed numerics; return the folder of its results."""
     output = files / name
     output.mkdir(exist_ok=True)
     shock = SHOCK | {"numerics": NUMERICS | (numerics or {})}
@@ -48,12 +50,14 @@ def results(files: Path, name: str, mode: str, numerics: dict | None = None, **c
 
 
 def arrays(path: Path) -> dict[str, np.ndarray]:
+    """Return the arrays of an NPZ file by name."""
     with np.load(path) as archive:
         return dict(archive)
 
 
 @pytest.fixture(scope="module")
 def two_scale(files) -> Path:
+    """Return the folder with the results of a run with two scales."""
     return results(files, "two_scale", "two_scale")
 
 

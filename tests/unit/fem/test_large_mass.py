@@ -42,6 +42,7 @@ def files(tmp_path_factory) -> Path:
 
 
 def results(files: Path, assembly: str = "assembly.msh", **changes) -> tuple[dict, dict[str, np.ndarray]]:
+    """Run the package with changed keys; return its result and its history."""
     output = files / "_".join(["out", *changes])
     output.mkdir(exist_ok=True)
     meshes = (files / assembly, files / "joints.msh")

@@ -27,6 +27,7 @@ from tests.support.fem_levels import Levelled, dense_effective_stiffness, joint_
 
 @pytest.fixture(scope="module", params=[(12,), (7, 3), (4, 3, 3)], ids=str)
 def model(request) -> Levelled:
+    """Return a joint on a board with elements on each step level."""
     made = levelled(joint_on_board(), ELASTIC, request.param)
     assert np.bincount(made.level).min() > 0
     return made

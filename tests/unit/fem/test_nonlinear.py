@@ -88,6 +88,7 @@ def amplitudes(values: np.ndarray, gradient: np.ndarray, gamma: np.ndarray, fini
 
 
 def energy_of(amplitude: np.ndarray, resistance: np.ndarray) -> float:
+    """Return the energy a . R a / 2 of amplitudes a with a resistance matrix R."""
     return 0.5 * amplitude @ resistance @ amplitude
 
 

@@ -150,6 +150,7 @@ def test_principal_strain_of_pure_shear():
 
 
 def write_history(path: Path, scale: float, joints: tuple[str, ...] = ("A1", "A2")) -> Path:
+    """Write a synthetic history of some joints, scaled; return the path."""
     time = np.linspace(0, 1, 11)
     base = scale * np.sin(time)[:, None]
     np.savez(

@@ -28,6 +28,7 @@ SHOCK = {
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory) -> Path:
+    """Return a folder with the meshes of the small package and its coarse joints."""
     directory = tmp_path_factory.mktemp("one_way")
     write_small_assembly(directory)
     coarse = []
@@ -41,6 +42,7 @@ def files(tmp_path_factory) -> Path:
 
 
 def request(files: Path, name: str, **coupling) -> RunInput:
+    """Return the input of a run with one-way coupling and changed settings."""
     return RunInput(
         mode="two_scale",
         materials=ELASTIC,
@@ -52,6 +54,7 @@ def request(files: Path, name: str, **coupling) -> RunInput:
 
 
 def results(files: Path, name: str, **coupling) -> tuple[dict, dict[str, np.ndarray]]:
+    """Run the package with one-way coupling; return its result and its history."""
     (files / name).mkdir()
     run_package(MPI.COMM_SELF, request(files, name, **coupling))
     with np.load(files / name / "history.npz") as arrays:

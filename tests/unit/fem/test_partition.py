@@ -8,12 +8,14 @@ from reflowshock.fem.parallel.partition import partition
 
 
 def plate(count: int = 24):
+    """Return the mesh of a plate, from elements along its shorter side."""
     return mesh_of(
         *grid(np.linspace(0, 3, 3 * count // 2 + 1), np.linspace(0, 2, count + 1), [0, 0.05, 0.1]), "board", {}
     )
 
 
 def shares(rank: np.ndarray, work: np.ndarray, ranks: int) -> np.ndarray:
+    """Return the share of the work of each rank, shape (ranks, ...)."""
     return np.array([work[rank == k].sum(axis=0) for k in range(ranks)]) / work.sum(axis=0)
 
 

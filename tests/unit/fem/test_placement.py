@@ -46,10 +46,12 @@ KIND = Kind([LIBRARY["FR4"], LIBRARY["copper"]], "incompatible_modes", "small", 
 
 
 def cost(macro: float, meso: float, latency: float = 1e-5) -> WindowCost:
+    """Return the cost of a window, from seconds of both models and of a message."""
     return WindowCost(ModelCost(macro, 0.0, 1), ModelCost(meso, 0.0, 8), latency)
 
 
 def best(total: int, speeds: list[float] | None = None, window: WindowCost = EVEN, **asked):
+    """Return the best placement of two models on ``total`` ranks."""
     return alternatives(Ranks(total=total, **asked), speeds or [1.0] * total, window)[0].placement
 
 
@@ -143,11 +145,13 @@ def model(count: int, steps: int, level: int = 0, ratios: tuple[int, ...] = ()) 
 
 
 def measured(ranks: int, box: float = 1e-7, assembled: float = 4e-7, slow: float = 1.0) -> Measured:
+    """Return measured costs of ranks, the first of which is slower by a factor."""
     element = np.tile([box, assembled, 0.0, 0.0, 0.0], (ranks, 1)) * np.array([slow] + [1.0] * (ranks - 1))[:, None]
     return Measured(StepCost(np.zeros(element.shape), element), 1e-6)
 
 
 def planned(ranks: Ranks, measurement: Measured, **loads: ModelWork):
+    """Return the plan of models with some work on ranks with measured costs."""
     family = {role: families(load.mesh, load.kind) for role, load in loads.items()}
     return plan_from(loads, family, ranks, measurement, True)
 

@@ -73,6 +73,7 @@ def test_a_point_outside_is_said_with_the_nearest_node():
 
 
 def load_of(request):
+    """Return the model and the only load of a structure."""
     model, _ = build_structure(MPI.COMM_SELF, request, [])
     (load,) = structure_loads(LoadedModel(MPI.COMM_SELF, model.body, model.tables, request), pulses_of(request.loads))
     return model, load

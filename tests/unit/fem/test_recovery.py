@@ -11,6 +11,7 @@ SURFACE = (0.0, -4e-3 / 3, THICKNESS)
 
 
 def around(mesh, node):
+    """Return the cells near a node, their centres, and how many of them contain it."""
     cells = patch(mesh, node)
     centres = mesh.points[mesh.cells[cells]].mean(axis=1)
     return cells, centres, int((mesh.cells[cells] == node).any(axis=1).sum())

@@ -59,6 +59,7 @@ def test_broken_run_continues_to_the_same_bits(tmp_path, monkeypatch, name):
 
 
 def run_some_windows(count: int):
+    """Return a replacement of ``run_window`` that stops after ``count`` windows."""
     left = iter(range(count))
     real = time_loop.run_window
 

@@ -25,6 +25,7 @@ def bodies():
 
 
 def run(*parts) -> None:
+    """Advance participants by ``WINDOWS`` windows."""
     for _ in range(WINDOWS):
         for part in parts:
             part.begin_window()
@@ -33,10 +34,12 @@ def run(*parts) -> None:
 
 
 def rigid(time: float, points: np.ndarray) -> np.ndarray:
+    """Return the velocities of a rigid-body motion at points, shape (n, 3) [m/s]."""
     return np.array([1.0, -2.0, 0.5]) + np.cross([300.0, -100.0, 200.0], points)
 
 
 def stretched(time: float, points: np.ndarray) -> np.ndarray:
+    """Return the velocities of a uniform expansion at points, shape (n, 3) [m/s]."""
     return 300.0 * points
 
 

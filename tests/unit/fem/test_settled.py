@@ -9,6 +9,7 @@ PERIOD = 4e-3
 
 
 def history(end: float, stress, deflection=None) -> dict[str, np.ndarray]:
+    """Return a synthetic history until an end time [s], from functions of time."""
     time = np.linspace(0.0, end, 401)
     swing = np.sin(2.0 * np.pi * time / PERIOD) if deflection is None else deflection(time)
     side = np.outer(stress(time), [1.0, 0.5])

@@ -26,6 +26,7 @@ G = 9.80665
 
 
 def shock(**changes) -> Shock:
+    """Return the parameters of a shock of 1500 G for 0.5 ms; ``changes`` replace fields."""
     return Shock(**({"peak_acceleration": 1500 * G, "pulse_duration": 5e-4, "duration": 1e-3} | changes))
 
 
@@ -81,6 +82,7 @@ def test_possible_shock_has_no_problem():
 
 
 def box(held: bool) -> tuple[MeshData, Body]:
+    """Return mesh and body of two elements, held by symmetry or free."""
     points, cells = grid([0.0, 1e-3, 2e-3], [0, 1e-3], [0, 1e-3])
     facets = {"low": on(0, 0.0), "high": on(0, 2e-3)} | ({"symmetry_x": on(0, 0.0)} if held else {})
     mesh = mesh_of(points, cells, "board", facets)

@@ -11,6 +11,7 @@ MEASURED = {(80, 61, 5): (2.27e10, 3.14e7), (40, 41, 5): (4.42e9, 8.42e6), (20, 
 
 
 def scene(**changes) -> StructureProblem:
+    """Return the problem of the clamped strip; ``changes`` replace tables."""
     names = StructureProblem.model_fields
     return StructureProblem.model_validate({k: v for k, v in structure_tables_of(**changes).items() if k in names})
 

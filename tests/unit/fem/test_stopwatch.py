@@ -19,6 +19,7 @@ class TwoRanks:
 
 
 def at(monkeypatch, second: float) -> None:
+    """Set both clocks of the stopwatch to a second."""
     monkeypatch.setattr(time, "perf_counter", lambda: second)
     monkeypatch.setattr(time, "process_time", lambda: 0.5 * second)
 

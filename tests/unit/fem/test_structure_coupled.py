@@ -35,6 +35,7 @@ TABLES = {
 
 
 def dynamics(**changes) -> dict:
+    """Return the table ``dynamics`` of two coupled models; ``changes`` replace keys."""
     numerics = {"history_samples": 60, "field_samples": 2}
     return {"duration": 2e-5, "coupling": {"scheme": "held_velocity"}, "numerics": numerics} | changes
 

@@ -33,6 +33,7 @@ def scene(**changes) -> StructureProblem:
 
 
 def layered(material: str, **more) -> dict:
+    """Return the table ``structure`` with one layer of a material."""
     layers = {"board": {"material": material, "thickness": 1e-3}}
     return {"length": 0.1, "width": 0.05, "cells": [8, 6], "layers": layers} | more
 

@@ -38,6 +38,7 @@ def run(directory: Path, **changes) -> tuple[dict, dict[str, np.ndarray]]:
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory) -> tuple[Path, dict, dict[str, np.ndarray]]:
+    """Return folder, result and history of a run without interruption."""
     directory = tmp_path_factory.mktemp("plastic") / "whole"
     return directory, *run(directory)
 

@@ -44,6 +44,7 @@ ALIKE = FR4.model_copy(update={"thermal_expansion_in_plane": 15.9e-6})
 
 
 def gaps(structure, temperature: float, wrenches=None) -> np.ndarray:
+    """Return the change of each gap at a temperature [K], shape (joints, 3) [m]."""
     modes = structure.rigid_modes
     wrenches = np.zeros(modes.pad_motion.shape[1:]) if wrenches is None else wrenches
     motion = structure.solve(temperature, 0.0, wrenches, np.zeros(len(modes.names))).pad_motion

@@ -20,27 +20,32 @@ FR4_LAYERS = {"substrate": "FR4", "die": "FR4"}
 
 @pytest.fixture(scope="module")
 def floating(tmp_path_factory) -> ThermalStructure:
+    """Return the heated package on its board, free to move."""
     return ThermalStructure.build(MPI.COMM_SELF, small_structure(tmp_path_factory.mktemp("floating")))
 
 
 @pytest.fixture(scope="module")
 def moved(tmp_path_factory) -> ThermalStructure:
+    """Return the heated package with prescribed motions of its corners."""
     return ThermalStructure.build(MPI.COMM_SELF, small_structure(tmp_path_factory.mktemp("moved"), **MOVED))
 
 
 @pytest.fixture(scope="module")
 def full(tmp_path_factory) -> ThermalStructure:
+    """Return a heated plate without planes of symmetry, with four pads."""
     mesh = Layers(8e-3, 6e-3, (0.4e-3, 0.4e-3), (6, 5, 2, 2)).mesh(())
     pads = pads_at([(1e-3, 1e-3), (3e-3, 1e-3), (1e-3, 2e-3), (3e-3, 2e-3)], 0.3e-3)
     return structure_of(mesh, tmp_path_factory.mktemp("full"), pads, FR4_LAYERS)
 
 
 def wrenches_of(structure: ThermalStructure, seed: int) -> np.ndarray:
+    """Return random wrenches on the pads, shape (joints, 2, 6) [N, N m]."""
     shape = structure.rigid_modes.pad_motion.shape[1:]
     return np.random.default_rng(seed).normal(size=shape) * ([1e-3] * 3 + [1e-7] * 3)
 
 
 def at_reference(structure: ThermalStructure, wrenches: np.ndarray, rigid=None, corner: float = 0.0):
+    """Return the solution of wrenches on the pads at the reference temperature."""
     free = np.zeros(len(structure.rigid_modes.names)) if rigid is None else rigid
     return structure.solve(REFERENCE, corner, wrenches, free)
 

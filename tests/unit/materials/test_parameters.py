@@ -21,6 +21,7 @@ def general(**changes: float) -> GeneralOrthotropic:
 
 
 def refused(make, *arguments, **changes) -> dict:
+    """Return the only validation error of a function with arguments."""
     with pytest.raises(ValidationError) as caught:
         make(*arguments, **changes)
     assert caught.value.error_count() == 1

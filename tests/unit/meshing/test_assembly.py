@@ -20,6 +20,7 @@ class Assembly(MeshFile):
 
 @pytest.fixture(scope="module")
 def quarter(tmp_path_factory):
+    """Return the assembly of a quarter board."""
     return Assembly(tmp_path_factory.mktemp("quarter"), package(), board())
 
 

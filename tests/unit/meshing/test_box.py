@@ -96,6 +96,7 @@ def test_layers_whose_elements_differ_need_hexahedra_without_holes(changes, word
 
 
 def nodes_of(mesh: meshio.Mesh, name: str) -> np.ndarray:
+    """Return the numbers of the nodes of a named cell set, sorted."""
     pairs = zip(mesh.cells, mesh.cell_sets[name], strict=True)
     return np.unique(np.concatenate([block.data[chosen].ravel() for block, chosen in pairs if len(chosen)]))
 

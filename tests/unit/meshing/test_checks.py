@@ -8,6 +8,7 @@ from reflowshock.meshing.board.parameters import Warpage
 
 
 def found(the_package, the_board, corner=0.0):
+    """Return key -> problem of an assembly with a corner warpage [m]."""
     return {problem.key: problem for problem in problems(the_package, the_board, Warpage(corner=corner))}
 
 
@@ -19,6 +20,7 @@ def test_sound_parameters_have_no_problem():
 
 
 def pad(diameter, mask_opening, definition):
+    """Return the table of a pad, from lengths in mm."""
     return {"diameter": diameter * MM, "mask_opening": mask_opening * MM, "definition": definition}
 
 
@@ -57,6 +59,7 @@ def test_impossible_boards(changes, key):
 
 
 def places(*pairs, diameter=2.0):
+    """Return the table of holes at some positions, from lengths in mm."""
     return {"diameter": diameter * MM, "at": [(x * MM, y * MM) for x, y in pairs]}
 
 
@@ -84,6 +87,7 @@ def test_impossible_boards_aside(changes, key, message):
 
 
 def with_holes(diameter, **changes):
+    """Return a board with holes of a diameter [mm] near its corners."""
     return board(
         holes={"diameter": diameter * MM, "inset_x": 0.7501 * diameter * MM, "inset_y": 0.7501 * diameter * MM},
         **changes,

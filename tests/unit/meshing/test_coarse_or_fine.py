@@ -34,6 +34,7 @@ def meshes():
 
 @pytest.fixture(scope="module")
 def files(meshes, tmp_path_factory) -> tuple[MeshData, MeshData]:
+    """Return fine and coarse joints as they are read from their files."""
     folder = tmp_path_factory.mktemp("joints")
     for name, joints in vars(meshes).items():
         write_joints(joints, folder / f"{name}.msh")

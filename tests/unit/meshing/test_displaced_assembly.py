@@ -29,6 +29,7 @@ def flat(tmp_path_factory):
 
 
 def nodes_of(mesh, *parts):
+    """Return the numbers of the nodes of mesh parts, sorted."""
     return np.unique(np.concatenate([mesh.cells(part).ravel() for part in parts]))
 
 

@@ -20,6 +20,7 @@ FLAT = Warpage()
 
 @pytest.fixture(scope="module")
 def sites():
+    """Return the pad sites of the small package by name."""
     return {site.name: site for site in pad_table(package(), board(), FLAT)}
 
 

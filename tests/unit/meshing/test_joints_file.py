@@ -17,6 +17,7 @@ WARPAGE = Warpage(corner=0.03 * MM)
 
 @pytest.fixture
 def meshes():
+    """Return the meshes of all joints of the small package."""
     return [
         mesh_joint(barrel(site.gap, 0.03 * MM, offset=0.02 * MM), site, package(), side_of(WARPAGE, package()))
         for site in pad_table(package(), board(), WARPAGE)

@@ -24,6 +24,7 @@ def site_below(surface: ClosedSurface) -> PadSite:
 
 
 def meshed(surface: ClosedSurface, site: PadSite):
+    """Return the mesh of a closed surface at a pad site."""
     whole = package()
     return mesh_joint(surface, site, whole, Underside(pad_planes(surface), 0.0, 0.0, 2.0 * whole.copper.thickness))
 

@@ -24,6 +24,7 @@ def mesh_corner(bulge=0.04 * MM, warpage=WARPAGE, **changes):
 
 
 def nodes_of(mesh, facets):
+    """Return the positions of the nodes of a facet set, shape (n, 3) [m]."""
     return mesh.points[np.unique(mesh.facets[facets])]
 
 

@@ -18,6 +18,7 @@ from reflowshock.meshing.surface.closed_surface import (
 
 @pytest.fixture
 def arrays():
+    """Return points, triangles and rings of a truncated sphere."""
     return truncated_sphere(0.3 * MM, 0.15 * MM, 24, 9)[0]
 
 

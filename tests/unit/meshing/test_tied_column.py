@@ -29,6 +29,7 @@ def hollow():
 
 @pytest.fixture(scope="module")
 def hollow_joint():
+    """Return a joint with a void."""
     return hollow()
 
 

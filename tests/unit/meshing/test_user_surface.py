@@ -19,6 +19,7 @@ TURN = np.array([[0.96, -0.28, 0.0], [0.28, 0.96, 0.0], [0.0, 0.0, 1.0]])
 
 
 def write(folder, points, triangles, name="joint.stl", scale=1.0 / MM):
+    """Write triangles to a file in a folder, in mm; return the path."""
     meshio.write(folder / name, meshio.Mesh(np.asarray(points) * scale, [("triangle", np.asarray(triangles))]))
     return folder / name
 

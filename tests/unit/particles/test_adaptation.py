@@ -44,6 +44,7 @@ def moving(stretch=1.0, keep=None):
 
 
 def energy_losses(flow):
+    """Return the energy of a flow plus its losses so far, which is constant [J]."""
     return LIQUID.energy(flow.body) + flow.solver.state.losses.total
 
 

@@ -13,17 +13,20 @@ SPEED = 0.5
 
 @pytest.fixture
 def body():
+    """Return a body between an offset, tilted package and a board."""
     return Body.at_rest(joint_cloud(JointGeometry(1.0, 0.8, 0.8, offset=(0.1, 0.0), tilt=(0.1, 0.2)), 2.2, 0.25))
 
 
 @pytest.fixture
 def pinned(body):
+    """Return whether each particle is on a contact line, shape (n,)."""
     pinned = np.zeros(len(body.points), bool)
     pinned[np.concatenate(body.cloud.rings)] = True
     return pinned
 
 
 def field_of(admissible, unknowns):
+    """Return the velocity field of unknowns, shape (n, 3)."""
     return (admissible.basis @ unknowns).reshape(3, -1).T
 
 

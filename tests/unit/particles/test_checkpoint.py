@@ -45,6 +45,7 @@ class BrokenOff(Exception):
 
 
 def break_off(solder, path, steps=BREAK):
+    """Start the reflow of a joint with a checkpoint file and interrupt it after some steps."""
     calls = []
 
     def stop(_):
@@ -57,6 +58,7 @@ def break_off(solder, path, steps=BREAK):
 
 
 def check_equal(actual, expected):
+    """Check that two shapes are equal to the bit, histories included."""
     for field in fields(expected):
         expected_value = getattr(expected, field.name)
         if isinstance(expected_value, np.ndarray):
@@ -74,6 +76,7 @@ def check_equal(actual, expected):
 
 @pytest.fixture(scope="module")
 def uninterrupted():
+    """Return the shape of the joint without interruption."""
     return solve_joint(JOINT, QUASI_STATIC)
 
 

@@ -10,6 +10,7 @@ PITCH = 1e-3
 
 
 def keys(solder, geometries=GEOMETRIES):
+    """Return the keys of the problems of solder in an array of joints."""
     return [problem.key for problem in problems(solder, geometries, PITCH)]
 
 

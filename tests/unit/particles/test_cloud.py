@@ -13,6 +13,7 @@ GEOMETRY = JointGeometry(0.31e-3, 0.24e-3, 0.20e-3)
 
 
 def edges(triangles):
+    """Return the directed edges of triangles as a set of vertex pairs."""
     directed = np.concatenate([triangles[:, [k, (k + 1) % 3]] for k in range(3)])
     return {tuple(edge) for edge in directed}
 

@@ -19,10 +19,12 @@ PAD, MASK = np.radians(5.0), np.radians(148.0)
 
 @pytest.fixture
 def body():
+    """Return a body between two equal discs."""
     return Body.at_rest(joint_cloud(JointGeometry(1.0, 0.8, 0.8), 2.2, 0.2))
 
 
 def line_on(body, state=PINNED, pad=PAD):
+    """Return the contact line of a body on its first wall, with all vertices in a state."""
     ring = body.cloud.rings[0]
     line = ContactLine(0, (Pad((0, 0), 0.8, pad),), MASK, body.points[ring], np.array([len(ring)]))
     assert (line.state == PINNED).all()

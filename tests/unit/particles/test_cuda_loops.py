@@ -49,18 +49,22 @@ THINNING = Rheology(law="carreau", exponent=0.5, shear_rate=1e5, viscosity_at_in
 
 
 def small_dam(device: str) -> Simulation:
+    """Return a dam break of few particles on a device, at its start."""
     return dam(DamBreak(**TANK, numerics=SphNumerics(particles_across=8, xsph=0.5, device=device)))
 
 
 def small_channel(device: str) -> Simulation:
+    """Return a channel flow of few particles on a device, at its start."""
     return channel(Poiseuille(width=1e-3, speed=0.1, numerics=SphNumerics(particles_across=6, device=device)))
 
 
 def small_impact(device: str) -> Simulation:
+    """Return an impact of few particles on a device, at its start."""
     return droplet(Droplet(**INK, numerics=DropletNumerics(particles_per_diameter=8, device=device)))
 
 
 def small_impact_of_carreau(device: str) -> Simulation:
+    """Return an impact of a Carreau liquid on a device, at its start."""
     return droplet(Droplet(**INK, rheology=THINNING, numerics=DropletNumerics(**THINNED, device=device)))
 
 

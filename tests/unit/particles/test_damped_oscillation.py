@@ -9,6 +9,7 @@ TIME = np.linspace(0.0, 3.0, 200)
 
 
 def swing(frequency, harmonic=0.1):
+    """Return a damped oscillation with its harmonic at ``TIME``, shape (n,)."""
     decay, angle = np.exp(-0.2 * TIME), frequency * TIME
     return 0.05 + decay * np.cos(angle + 0.3) + harmonic * decay**2 * np.cos(2.0 * angle)
 

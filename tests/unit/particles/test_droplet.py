@@ -27,6 +27,7 @@ COARSE = DropletNumerics(particles_per_diameter=8)
 
 
 def drop(**changes):
+    """Return the parameters of a coarse droplet; ``changes`` replace them."""
     return Droplet(**INK | {"numerics": COARSE} | changes)
 
 

@@ -42,11 +42,13 @@ def shaken(cloud):
 
 @pytest.fixture(scope="module")
 def body():
+    """Return a cube on a wall with inner particles moved at random."""
     return shaken(box_cloud(1.0, 6))
 
 
 @pytest.fixture(scope="module")
 def space(body):
+    """Return the shape functions at the particles of the body."""
     return GalerkinSpace.of(body)
 
 

@@ -10,11 +10,13 @@ REACH = 0.3
 
 
 def tilted() -> Plate:
+    """Return a plate that is tilted about x and y."""
     return Plate.horizontal(0.0).moved(np.array([0.0, 0.0, 0.0, 0.2, -0.1, 0.0]))
 
 
 @pytest.fixture
 def points():
+    """Return random points, some of them on z = 0, shape (n, 3)."""
     cloud = np.random.default_rng(3).uniform(0.0, 1.0, (200, 3))
     cloud[:20, 2] = 0.0
     return cloud

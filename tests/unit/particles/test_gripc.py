@@ -31,11 +31,13 @@ from reflowshock.particles.surface.contact_line import ContactLine
 
 @pytest.fixture(scope="module")
 def box():
+    """Return the particles of a cube on a wall."""
     return box_cloud(1.0, 6)
 
 
 @pytest.fixture(scope="module")
 def operators(box):
+    """Return the quadratic operators at the particles of the cube."""
     return collocate(box.points, box.plates, box.spacing, "quadratic")
 
 

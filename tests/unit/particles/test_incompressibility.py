@@ -8,6 +8,7 @@ from reflowshock.particles.discretisation.incompressibility import SaddlePoint, 
 
 
 def problem(size=60, rows=20, seed=11):
+    """Return a random saddle-point problem."""
     rng = np.random.default_rng(seed)
     root = sparse.random(size, size, 0.1, random_state=seed) + 3.0 * sparse.identity(size)
     constraint = sparse.random(rows, size, 0.2, random_state=seed + 1) + sparse.eye(rows, size)

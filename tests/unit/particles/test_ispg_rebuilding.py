@@ -33,6 +33,7 @@ def liquid():
 
 
 def started(body):
+    """Return a flow of a body by the scheme ispg, before its first step."""
     return LiquidFlow(body, liquid(), TimeStep(0.02, body.cloud.spacing, 0.02), IspgStep())
 
 

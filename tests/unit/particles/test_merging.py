@@ -40,6 +40,7 @@ def two_drops(viscosity=0.5, **changes):
 
 
 def go(simulation, until):
+    """Run a simulation to a time, in place, and return it."""
     while simulation.time < until:
         simulation.step(simulation.time_step())
     return simulation

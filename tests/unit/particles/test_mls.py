@@ -8,18 +8,21 @@ from reflowshock.particles.ispg.stencils import DegenerateStencil
 
 @pytest.fixture
 def cloud():
+    """Return a lattice of points moved at random, shape (n, 3)."""
     axis = np.arange(7.0)
     points = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3)
     return points + np.random.default_rng(4).uniform(-0.15, 0.15, points.shape)
 
 
 def fit(points, rows, basis):
+    """Return the derivative operators at some rows of points."""
     neighbours = NeighbourList(SUPPORT[basis], skin=0.3)
     neighbours.update(points)
     return fit_derivatives(points, np.asarray(rows, np.int32), neighbours, basis)
 
 
 def weights(offsets, support):
+    """Return the weights of offsets (k, 3) within a support radius, shape (k,)."""
     return np.maximum(1.0 - (offsets**2).sum(axis=1) / support**2, 0.0) ** 3
 
 

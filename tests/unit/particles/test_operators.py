@@ -17,14 +17,17 @@ from reflowshock.particles.surface.surface_quality import vertex_normals
 
 @pytest.fixture
 def body():
+    """Return a cube on a wall at rest."""
     return Body.at_rest(box_cloud(1.0, 6))
 
 
 def discretise(body):
+    """Return the operators of linear tetrahedra in a body."""
     return LinearTetrahedra.start(body.points, fill_with_tetrahedra(body), density=5.0)(body)
 
 
 def power(matrix, field):
+    """Return field . matrix field for a vector field, shape (n, 3)."""
     vector = field.T.ravel()
     return float(vector @ (matrix @ vector))
 

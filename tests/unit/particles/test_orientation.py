@@ -17,6 +17,7 @@ small = st.floats(-1.0, 1.0).map(lambda value: 0.0 if abs(value) < 1e-4 else val
 
 
 def joint(offset, tilt):
+    """Return the geometry of a joint, from offset and tilt in small units."""
     return JointGeometry(
         0.33e-3, RADIUS, RADIUS, tuple(5e-5 * value for value in offset), tuple(0.05 * t for t in tilt)
     )

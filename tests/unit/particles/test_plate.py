@@ -9,6 +9,7 @@ SEED = 11
 
 
 def random_plate():
+    """Return a plate that is offset and tilted."""
     return Plate.horizontal(0.4, (0.2, -0.1)).moved(np.array([0.3, 0.1, -0.2, 0.4, -0.7, 0.2]))
 
 

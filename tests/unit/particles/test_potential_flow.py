@@ -10,6 +10,7 @@ from reflowshock.particles.steps.relaxation import SUPPORT
 
 
 def shaken_flow(count, seed=17):
+    """Return a flow of a cube whose inner particles are moved at random."""
     cloud = box_cloud(1.0, count)
     body = Body.at_rest(cloud)
     off_wall = body.interior[cloud.wall[body.interior] < 0]
@@ -36,6 +37,7 @@ def edges(body, support):
 
 
 def plain_laplacian(body, support):
+    """Return the Laplacian of a body as a dense matrix, shape (n, n)."""
     weight, moment = edges(body, support)
     scale = body.volumes / moment.sum(axis=1)
     edge = 3.0 * weight * (scale[:, None] + scale)

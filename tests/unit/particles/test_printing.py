@@ -24,6 +24,7 @@ BRIEF = PrintingNumerics(particles_per_diameter=8, settling=0.5)  # two drops: t
 
 
 def printing(**changes):
+    """Return the parameters of a small print; ``changes`` replace them."""
     return Printing(**INK | {"numerics": BRIEF} | changes)
 
 

@@ -10,6 +10,7 @@ from reflowshock.particles.scenes.reflow import solve_joint
 
 @pytest.fixture(scope="module")
 def shape():
+    """Return the shape of a coarse joint at rest."""
     numerics = SolderNumerics(spacing=1e-4)
     return solve_joint(JointGeometry(0.31e-3, 0.24e-3, 0.24e-3), Solder(volume=0.0724e-9, numerics=numerics))
 

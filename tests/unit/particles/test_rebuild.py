@@ -27,6 +27,7 @@ SPHERE = 4.0 / 3.0 * np.pi * R**3
 
 
 def sphere_body(spacing, centre=(0.0, 0.0, 0.0)):
+    """Return a ball of particles about a centre, from its spacing."""
     cloud = cloud_from_level_set(ball(grid_around_ball((0, 0, 0), R, spacing), (0, 0, 0), R), SPHERE, ())
     body = Body.at_rest(cloud)
     body.points += np.asarray(centre)
@@ -34,6 +35,7 @@ def sphere_body(spacing, centre=(0.0, 0.0, 0.0)):
 
 
 def quality(points, triangles):
+    """Return the quality of triangles, 1 if equilateral, shape (t,)."""
     corner = points[triangles]
     edges = corner - np.roll(corner, 1, axis=1)
     area = 0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)

@@ -51,10 +51,12 @@ class BreakingCheckpoint(Checkpoint):
 
 
 def points_of(shapes):
+    """Return the particle positions of shapes."""
     return [shape.points for shape in shapes]
 
 
 def settle(checkpoint):
+    """Return the positions of a joint under a floating package, run with a checkpoint."""
     plate = Floating(1, LIFT, np.array([0.0, 0.0, 1e-4]))
     return points_of([settle_joint(JOINT, SOLDER, (plate,), checkpoint=checkpoint)])
 
@@ -97,6 +99,7 @@ def coarse_viscous(process_time):
 
 
 def moved_in_galerkin_form(motion, checkpoint):
+    """Return arrays of a joint moved by the scheme ispg with a checkpoint."""
     shape = settle_joint(JOINT, viscous(), (motion,), checkpoint=checkpoint)
     assert len(shape.history["time"]) > 8
     return [shape.points, shape.velocity, shape.history["energy"], np.array(shape.metrics["offset"][0])]
@@ -115,6 +118,7 @@ def carry(checkpoint, solder=SOLDER):
 
 
 def carry_in_galerkin_form(checkpoint):
+    """Return arrays of a carried joint by the scheme ispg with a checkpoint."""
     return carry(checkpoint, coarse_viscous(1.0))
 
 
@@ -149,29 +153,35 @@ def flow_of(scheme, limit, section="none"):
 
 
 def flow_with(scheme, limit, checkpoint, section="none"):
+    """Return arrays of a drop at rest by a scheme, run with a checkpoint."""
     flow, run = flow_to_rest(*flow_of(scheme, limit, section), checkpoint=checkpoint)
     assert len(run.records) > 8
     return [flow.body.points, flow.body.velocity, flow.body.pressure, run.history(1.0)["energy"]]
 
 
 def flow_as_printed(checkpoint):
+    """Return arrays of a drop at rest by the published scheme, run with a checkpoint."""
     return flow_with("gripc", 0.5, checkpoint)
 
 
 def flow_in_galerkin_form(checkpoint):
+    """Return arrays of a drop at rest by the scheme ispg, run with a checkpoint."""
     return flow_with("ispg", 0.5, checkpoint)
 
 
 def flow_in_section(checkpoint):
+    """Return arrays of a drop in section at rest, run with a checkpoint."""
     return flow_with("ispg", 0.5, checkpoint, "axisymmetric")
 
 
 def swing(checkpoint):
+    """Return arrays of an oscillating drop, run with a checkpoint."""
     drop = solve_free_drop(SOLDER, amplitude=0.1, periods=0.1, steps_per_period=100, checkpoint=checkpoint)
     return [drop.points, *drop.history.values(), *(snapshot.points for snapshot in drop.snapshots)]
 
 
 def merge(checkpoint):
+    """Return arrays of two merging drops, run with a checkpoint."""
     flows = [start_flow(sphere_cloud(1e-10, 3), SOLDER, FREE, ()) for _ in range(2)]
     spacing = flows[0].body.cloud.spacing
     flows[1].body.points[:, 0] += 2.0 * np.cbrt(3e-10 / (4.0 * np.pi)) + 0.5 * spacing
@@ -237,6 +247,7 @@ def leaves(value, path=""):
 
 
 def start_drop(scheme, limit):
+    """Return the flow of a cube on a wall by a scheme, at time 0."""
     drop, solder = flow_of(scheme, limit)
     cloud = box_cloud(drop.edge, drop.count)
     return start_flow(cloud, solder, WETTING, (contact_line(cloud, 0, np.inf, solder),))

@@ -17,6 +17,7 @@ LAWS = [CARREAU, *(Rheology(law="power_law", exponent=power, shear_rate=1e5, bou
 
 
 def ink(rheology, **changes):
+    """Return a droplet with a rheology; ``changes`` replace parameters."""
     return Droplet(**INK | changes, rheology=rheology, numerics=DropletNumerics(particles_per_diameter=8))
 
 

@@ -54,6 +54,7 @@ def water(*forces, viscosity=0.0, inertia=True):
 
 
 def equations_of(body, time_step=1e-2):
+    """Return the equations of a body in section for a time step."""
     return SectionStep().prepare(body, water(), NeighbourList(1.0, 0.0)).equations(body, time_step)
 
 

@@ -28,6 +28,7 @@ AREAS = {1: lambda q: 2.0, 2: lambda q: 2.0 * np.pi * q, 3: lambda q: 4.0 * np.p
 
 
 def small_dam(**changes):
+    """Return a dam break of few particles; ``changes`` replace parameters."""
     parameters = {"height": 0.6, "width": 1.2, "tank_length": 3.22, "sensor_height": 0.12, "duration": 0.02}
     return DamBreak(**parameters | changes, numerics=SphNumerics(particles_across=10))
 

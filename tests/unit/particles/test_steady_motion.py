@@ -52,6 +52,7 @@ def drop(pull):
 
 
 def place(flow):
+    """Return the mean of x over the surface particles of a flow [m]."""
     return flow.body.points[: flow.body.cloud.surface_count, 0].mean()
 
 

@@ -27,6 +27,7 @@ def shaken(cloud, seed=6):
 
 
 def slope(function, points, direction, step=1e-6):
+    """Return the derivative of a function of points along a direction, by differences."""
     return (function(points + step * direction) - function(points - step * direction)) / (2 * step)
 
 

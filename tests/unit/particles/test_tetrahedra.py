@@ -14,6 +14,7 @@ from reflowshock.particles.steps.backward_difference import BackwardDifference
 
 @pytest.fixture
 def drop():
+    """Return a deformed free drop and its tetrahedra."""
     ball = sphere_cloud(2.0, 3)
     cells = tetrahedralise(ball.points, ball.spacing)
     body = Body.at_rest(ball)
@@ -22,10 +23,12 @@ def drop():
 
 
 def flat(field):
+    """Return a vector field (n, 3) by component, shape (3 n,)."""
     return field.T.ravel()
 
 
 def oriented(triangles):
+    """Return triangles as a set of vertex triples that begin with the smallest number."""
     first = np.argmin(triangles, axis=1)[:, None]
     turned = np.take_along_axis(triangles, (first + np.arange(3)) % 3, axis=1)
     return {tuple(row) for row in turned}

@@ -12,10 +12,12 @@ INK = {"diameter": 23e-6, "density": 1000.0, "surface_tension": 0.072, "viscosit
 
 
 def ink(xsph, **changes):
+    """Return a simulation of a small droplet with a factor of XSPH."""
     return droplet(Droplet(**INK | changes, numerics=DropletNumerics(particles_per_diameter=8, xsph=xsph)))
 
 
 def drifts(simulation):
+    """Return the additional velocity of XSPH of all liquid particles, shape (3, n) [m/s]."""
     velocities, rows = np.empty((3, simulation.fluids)), simulation.particles.rows
     for i in range(simulation.fluids):
         velocities[:, i] = drift_of(np.uint64(i), simulation.fluids, rows.of(i), simulation.fields, simulation.law)

@@ -63,11 +63,13 @@ class Fake:
 
 
 def request(tolerance: float | None = 0.02, budget: float = float("inf"), **settings: str) -> AccuracyRequest:
+    """Return the request of a convergence study with tolerance and budget."""
     return AccuracyRequest(CASE, settings, tolerance, budget, "reflowshock accuracy")
 
 
 @pytest.fixture(scope="module")
 def done(tmp_path_factory):
+    """Return study, runner, synthetic runs and folder of a finished study."""
     folder = tmp_path_factory.mktemp("runs") / "sessile_drop-accuracy"
     compute = Fake()
     accuracy, runner = measure(request(0.002), folder, compute)

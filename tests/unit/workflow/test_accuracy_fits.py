@@ -26,6 +26,7 @@ SIZES = (0.4, 0.2, 0.1, 0.05)
 
 
 def run_at(size: float) -> StudyRun:
+    """Return the run of a study with a particle spacing [mm]."""
     return StudyRun(f"size {size:g}", "size", {"drop.spacing": f"{size} mm"}, size)
 
 
@@ -36,6 +37,7 @@ STUDY = ConvergenceStudy(
 
 
 def results(exact: float | None) -> dict:
+    """Return run -> synthetic height with an error of second order."""
     return {run.name: {"height": Quantity(3.0 + 2.0 * run.value**2, exact)} for run in RUNS}
 
 

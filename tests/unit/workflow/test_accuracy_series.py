@@ -21,16 +21,19 @@ from tests.support.workflow_command import SMALL_CASE
 
 
 def case_of(name, *settings):
+    """Return a case of the checkout with settings."""
     return read_case(CASES / name / "case.toml", settings)
 
 
 @pytest.fixture(scope="module")
 def bar():
+    """Return the case ``two_scale_bar``."""
     return case_of("two_scale_bar")
 
 
 @pytest.fixture(scope="module")
 def package():
+    """Return the case ``bga_drop`` at its quick scale."""
     return case_of("bga_drop", "scale=quick")
 
 

@@ -25,6 +25,7 @@ NEIGHBOUR = {
 
 
 def judged(peak=2.5e-3, case=JEDEC, shape=None, **parameters):
+    """Return the verdict on a board with a peak deflection [m]."""
     failure = Failure.model_validate({"board_deflection": parameters})
     swing = peak * np.sin(np.pi * TIME / TIME[-1]) if shape is None else peak * shape
     history = {"time": TIME, "board_centre": np.outer(swing, [0.0, 0.0, -1.0])}
@@ -32,6 +33,7 @@ def judged(peak=2.5e-3, case=JEDEC, shape=None, **parameters):
 
 
 def with_packages(case=JEDEC, **packages):
+    """Return a case with further packages on its board."""
     table = case.model_dump() | {"packages": {name: NEIGHBOUR | item for name, item in packages.items()}}
     return type(case).model_validate(table)
 

@@ -120,12 +120,14 @@ BAD_VALUES = {
 
 
 def problems_of(*settings: str, path: Path = SMALL_CASE) -> list[str]:
+    """Return the error messages of a case with settings, which must be rejected."""
     with pytest.raises(CaseError) as caught:
         read_case(path, settings)
     return caught.value.lines()
 
 
 def line_of(path: Path, start: str) -> int:
+    """Return the number of the first line of a file that begins with a text."""
     return 1 + next(k for k, line in enumerate(path.read_text().splitlines()) if line.startswith(start))
 
 

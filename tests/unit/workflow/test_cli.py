@@ -55,6 +55,7 @@ def test_a_new_case_is_complete_and_equal_to_its_template(call, tmp_path):
 
 
 def flat(table: dict, prefix: str = ""):
+    """Yield the dotted keys of a nested table."""
     for key, value in table.items():
         if isinstance(value, dict):
             yield from flat(value, f"{prefix}{key}.")

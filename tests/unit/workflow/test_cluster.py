@@ -43,6 +43,7 @@ Error in rule surface:
 
 
 def case(name: str, *settings: str):
+    """Return a case of the checkout with settings."""
     return read_case(CASES / name / "case.toml", settings, oversubscribe=True)
 
 
@@ -128,6 +129,7 @@ def test_missing_programs_are_reported_before_anything_runs(monkeypatch):
 
 
 def program(folder: Path, name: str, body: str) -> None:
+    """Write an executable Python program to a folder."""
     path = folder / name
     path.write_text(f"#!{sys.executable}\n{body}\n")
     path.chmod(0o755)

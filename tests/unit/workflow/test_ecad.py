@@ -29,12 +29,14 @@ NO_OPTIONS = dict.fromkeys(("--thickness", "--ball", "--holes"))
 
 @pytest.fixture(params=WRITERS)
 def board(request, tmp_path) -> Path:
+    """Return the path of the board in one ECAD format."""
     pytest.importorskip("gerbonara") if request.param == "gerbers" else None
     return WRITERS[request.param](tmp_path / f"board.{request.param}")
 
 
 @pytest.fixture
 def in_tmp(tmp_path, monkeypatch) -> Path:
+    """Return a temporary folder, which is the present one during the test."""
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -97,6 +99,7 @@ def test_a_component_on_the_bottom_side_mirrors_the_board():
 
 
 def board_with(component):
+    """Return a layout with one component."""
     return Layout(Path("a"), (-1e-2, -1e-2), (1e-2, 1e-2), 1e-3, (), {component.reference: component})
 
 

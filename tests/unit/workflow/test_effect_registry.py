@@ -46,6 +46,7 @@ SCENES = {
 
 
 def printed(case) -> list[str]:
+    """Return the lines of the table of effects of a case."""
     console = Console(width=100, record=True, file=StringIO())
     console.print(effects_table(case, kind_of(case).forecast(case).effects, "scene"))
     return console.export_text().splitlines()

@@ -27,6 +27,7 @@ COMMAND = "from reflowshock.workflow.__main__ import main; main()"
 
 
 def raised(error: BaseException, cause: BaseException | None = None) -> BaseException:
+    """Return an error with the traceback and the cause of a raised one."""
     try:
         raise error from cause
     except BaseException as caught:
@@ -107,6 +108,7 @@ def test_the_last_lines_are_printed_if_no_file_can_be_written(monkeypatch, capsy
 
 
 def command(*arguments: str, **options) -> subprocess.CompletedProcess:
+    """Run the test's own command with arguments; return the completed process."""
     heed = ["env", "--default-signal=INT,HUP"]  # ignored in the background of a shell, under nohup
     line = [*heed, sys.executable, "-c", COMMAND, *arguments]
     return subprocess.run(line, capture_output=True, encoding="utf-8", timeout=100, check=False, **options)

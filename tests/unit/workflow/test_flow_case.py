@@ -121,6 +121,7 @@ BAD_VALUES = {
 
 
 def forecast(case):
+    """Return the forecast of a case."""
     return kind_of(case).forecast(case)
 
 

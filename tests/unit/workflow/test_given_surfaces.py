@@ -49,6 +49,7 @@ def case_file(tmp_path) -> Path:
 
 
 def read(case_file: Path, **surfaces: str):
+    """Return a case whose joints have surfaces from files, by joint name."""
     settings = [f'package.surfaces.{name}="{path}"' for name, path in surfaces.items()]
     return read_case(case_file, ["package.standoff=0.35 mm", "warpage.corner=0 mm", *settings])
 
@@ -86,6 +87,7 @@ def test_what_does_not_fit_is_refused_by_key(case_file, name, path, message):
 
 
 def shape_of(surface, arrays) -> JointShape:
+    """Return the shape of a joint with a closed surface and its arrays."""
     points, triangles, lower, upper = arrays
     nothing = np.zeros((len(points), 3))
     metrics = {"volume": (enclosed_volume(surface), "m^3")}

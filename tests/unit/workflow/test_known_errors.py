@@ -23,6 +23,7 @@ NO_ORDER = Error(0.05, "finest run, all x 0.4")
 
 
 def measurement(size: float, against: str = "", **errors: Error) -> Measurement:
+    """Return a measurement at a size of a study, with errors of metrics."""
     return Measurement(f"all x {size}", "element size", size, {}, "", COST, errors, against=against)
 
 
@@ -85,6 +86,7 @@ def test_errors_have_the_order_of_their_extrapolation():
 
 
 def result(windows: int = 100, **metrics: float | str) -> dict:
+    """Return a synthetic summary with metrics and windows."""
     records = {name: {"value": value, "unit": ""} for name, value in metrics.items()}
     return {"metrics": records, "model": {"window": 1e-5, "windows": windows}}
 

@@ -12,6 +12,7 @@ from reflowshock.workflow.store.folders import is_busy, lock_folder
 
 @pytest.fixture(autouse=True)
 def told(monkeypatch, tmp_path):
+    """Let progress be written to a temporary folder."""
     monkeypatch.setenv(progress_file.VARIABLE, "")
     write_progress_to(tmp_path)
 

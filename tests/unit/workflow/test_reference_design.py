@@ -38,10 +38,12 @@ def base(tmp_path):
 
 
 def read(folder, *settings):
+    """Return the shortened case with a reference run in a folder."""
     return read_case(SMALL_CASE, [f"shock.failure.reference.run={folder}", *settings])
 
 
 def fault(folder, *settings) -> Problem:
+    """Return the message of the only problem of a reference run."""
     with pytest.raises(CaseError) as error:
         read(folder, *settings)
     (problem,) = error.value.problems
@@ -50,6 +52,7 @@ def fault(folder, *settings) -> Problem:
 
 
 def judged(reference_metrics, **changes):
+    """Return ratio name -> verdict on a drop against reference metrics."""
     failure = Failure.model_validate({"reference": {"run": "runs/base", **changes}})
     drop = JudgedDrop(with_value(POINT.case, "shock.failure", failure), METRICS, {}, (), reference_metrics)
     return {name: ReferenceRatio(name).judge(drop) for name in RATIOS}

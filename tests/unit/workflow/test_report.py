@@ -27,6 +27,7 @@ JOINT = {"standoff": 3.2e-4, "max_width": 5.5e-4}
 
 @pytest.fixture
 def history():
+    """Return a synthetic history of a drop, name -> samples."""
     time = np.linspace(0.0, 1e-3, 101)
     wave = np.sin(np.pi * time / 1e-3)
     zero = np.zeros_like(time)

@@ -33,6 +33,7 @@ def box(nx: int, ny: int, nz: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def decoded(data: dict, number: int) -> np.ndarray:
+    """Return an array of the report's data by its number."""
     array = data["arrays"][number]
     return np.frombuffer(zlib.decompress(base64.b64decode(array["data"])), dtype=f"<{array['type']}")
 
@@ -172,6 +173,7 @@ def test_what_cooling_left_is_shown_by_part(tmp_path):
 
 
 def page_of(tmp_path, **context) -> str:
+    """Return the HTML of a report with hostile texts; ``context`` replaces parts."""
     content = {"case": {"title": HOSTILE, "name": "x"}, "curves": {}, "scenes": {}, "pictures": {}, "healthy": True}
     tables = {"parameters": {"head": ["key", "value"], "rows": [[HOSTILE, HOSTILE]]},
               "effects": {"head": ["effect"], "rows": []}, "versions": {"head": ["library"], "rows": []}}  # fmt: skip

@@ -23,6 +23,7 @@ HALF = 2.5 * MILLI
 
 @pytest.fixture(scope="module")
 def structure():
+    """Return the products of a bowed structure."""
     return bowed_structure(NAMES, X, Y, HALF)
 
 
@@ -120,6 +121,7 @@ def test_joints_with_other_faces_are_not_compared():
 
 
 def history_of(*peaks: float) -> dict[str, np.ndarray]:
+    """Return a history whose joints have peaks of stress."""
     wave = np.sin(np.linspace(0.0, np.pi, 21))
     stress = np.outer(wave, peaks)
     return {"time": np.linspace(0.0, 1e-3, 21), "joints": np.array(NAMES), "peel_board": stress,
@@ -141,6 +143,7 @@ def test_the_shape_effect_belongs_to_the_critical_joint():
 
 
 def record(name: str, **others) -> dict:
+    """Return the record of a joint; ``others`` replace entries."""
     pad = {"name": name, "x": 0.0, "y": 0.0, "shape": "A4", "standoff": 3e-4, "max_width": 5e-4, "verdict": "ok"}
     return pad | others
 

@@ -32,6 +32,7 @@ def case_file(tmp_path):
 
 
 def lines_of(path, *settings) -> str:
+    """Return the error message of a case with settings, which must be rejected."""
     with pytest.raises(CaseError) as caught:
         read_case(path, settings)
     return "\n".join(caught.value.lines())

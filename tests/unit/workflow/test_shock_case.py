@@ -17,6 +17,7 @@ PULSE = 'peak_acceleration = "1500 G"\npulse_duration = "0.02 ms"\n'
 
 
 def case_with(directory: Path, pulse: str) -> Path:
+    """Write the shortened case with another pulse; return the path."""
     path = directory / "case.toml"
     text = SMALL_CASE.read_text()
     assert PULSE in text

@@ -25,6 +25,7 @@ CASES = Path(__file__).resolve().parents[3] / "cases"
 
 
 def predicted(*settings: str):
+    """Return the forecast of the shock of the shortened case with settings."""
     case = decided(read_case(SMALL_CASE, settings, oversubscribe=True))
     return forecast_shock(case, forecast_parts(case))
 

@@ -20,16 +20,19 @@ from tests.support.workflow_command import SMALL_CASE
 
 @pytest.fixture
 def run(tmp_path):
+    """Return a run of the shortened case in a temporary folder."""
     record_of(tmp_path / "reflow")
     return Run(tmp_path, read_case(SMALL_CASE), cores=1)
 
 
 @pytest.fixture
 def product(tmp_path):
+    """Return the path of a product that does not exist."""
     return tmp_path / "products/surface-1"
 
 
 def write_surfaces(_run: Run, folder: Path) -> Findings:
+    """Write a file as a stage does; return a metric and a failed check."""
     (folder / "surfaces.json").write_text("{}")
     return Findings(
         metrics={"volume": {"value": 1.0, "unit": "m^3"}},
@@ -38,6 +41,7 @@ def write_surfaces(_run: Run, folder: Path) -> Findings:
 
 
 def fail(_run: Run, folder: Path) -> Findings:
+    """Write half a file as a stage does and raise ValueError."""
     (folder / "surfaces.json").write_text("half")
     raise ValueError("no surface")
 

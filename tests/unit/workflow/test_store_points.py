@@ -13,6 +13,7 @@ HEATED = {"warpage.corner": "0 mm", "thermal.steps": "2"}
 
 
 def digests(settings: dict[str, str]) -> dict[str, str]:
+    """Return stage -> digest of its parameters, for the shortened case with settings."""
     return dict(read_possible_points(SMALL_CASE, [settings])[0][0].digests)
 
 

@@ -34,11 +34,13 @@ RERUN = {
 
 
 def point_of(*settings: str) -> Point:
+    """Return the point of the shortened case with settings."""
     return Point({}, read_case(SMALL_CASE, settings))
 
 
 @pytest.fixture
 def store(tmp_path):
+    """Return the store of an empty run folder."""
     return Store(tmp_path / "run", one_run=True)
 
 
@@ -51,6 +53,7 @@ def done(store):
 
 
 def stale(store: Store, point: Point) -> tuple[str, ...]:
+    """Return the names of the stages that are not up to date."""
     return tuple(name for name, state in examine(store, point).items() if state.stale)
 
 

@@ -21,6 +21,7 @@ NAMES = POINT.case.pipeline.names
 
 @pytest.fixture
 def store(tmp_path):
+    """Return the store of a run folder that shows all products."""
     return shown_run(tmp_path / "run")
 
 

@@ -32,10 +32,12 @@ from tests.support.workflow_command import wait_until
 
 
 def cases(**changes):
+    """Return the hard cases of a table; ``changes`` replace keys."""
     return hard_cases("elements_rod", TABLE | changes, "elements_rod.toml", None)
 
 
 def refused(**changes):
+    """Return the error message of a table with changes."""
     with pytest.raises(CaseError) as caught:
         cases(**changes)
     return str(caught.value)

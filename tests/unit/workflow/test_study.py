@@ -27,6 +27,8 @@ GRID = '[grid]\n"package.pitch" = ["0.9 mm", "1 mm"]\n"solder.volume" = ["0.07 m
 
 @pytest.fixture
 def write(tmp_path):
+    """Return a function that writes a study file and returns its path."""
+
     def study(text: str, head: str = HEAD) -> Path:
         path = tmp_path / "study.toml"
         path.write_text(head + text)
@@ -150,6 +152,7 @@ def test_remaining_time_follows_completed_stages():
 
 
 def row(number: int, pitch: float, pad: float, stress: float | str | None, verdict: str = HEALTHY) -> Row:
+    """Return a row of a study, from pitch [mm], pad volume [mm^3] and stress [Pa]."""
     metrics = {} if stress is None else {"stress": {"value": stress, "unit": "Pa"}}
     settings = {"package.pitch": f"{pitch:g} mm", "solder.volume": f"{pad:g} mm^3"}
     return Row(number, f"key{number}", settings, verdict, seconds=1.0, metrics=metrics)
@@ -209,6 +212,7 @@ def test_page_has_ranking_effects_and_failures(write, tmp_path):
 
 
 def row_with_outcome(number: int, settings: dict[str, str], word: str) -> Row:
+    """Return a row of a study whose outcome is a word."""
     metrics = {"outcome": {"value": word, "unit": ""}, "stress": {"value": 4e-6 * number, "unit": "m"}}
     return Row(number, f"key{number}", settings, HEALTHY, seconds=1.0, metrics=metrics)
 

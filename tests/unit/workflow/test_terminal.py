@@ -32,6 +32,7 @@ def console_output():
 
 
 def table_of(text: str) -> Table:
+    """Return a table for the terminal with a text in all its places."""
     table = new_table(text, text)
     table.add_row(text)
     table.caption = text

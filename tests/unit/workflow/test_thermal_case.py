@@ -18,6 +18,7 @@ GLASS = 'materials.board={ kind = "isotropic", density = "2 g/cm^3", young_modul
 
 
 def read(*settings: str):
+    """Return the shortened case without warpage, with settings."""
     return read_case(SMALL_CASE, ['warpage.corner="0 mm"', *settings], oversubscribe=True)
 
 

@@ -33,6 +33,7 @@ COUPLING = {
 
 
 def rows_of(table: dict) -> dict[str, str]:
+    """Return the rows of a table as first cell -> second cell."""
     return {row[0]: row[1] for row in table["rows"]}
 
 

@@ -32,17 +32,20 @@ OFF = {"board_deflection": {"apply": "off"}}
 
 
 def dropped(failure, history=HISTORY, metrics=None, reference=None, coarse=()):
+    """Return a drop to be judged, from its criteria of failure and its results."""
     case = with_value(CASE, "shock.failure", Failure.model_validate(failure))
     return JudgedDrop(case, metrics or {}, history, coarse, reference)
 
 
 def judged(life=None, coarse=(), history=HISTORY, **limits):
+    """Return the verdict on a drop with limits by criterion."""
     limits_with_source = {name: {"limit": limit, "source": "a test"} for name, limit in limits.items()}
     failure = OFF | limits_with_source | ({} if life is None else {"life": life})
     return verdict_of(dropped(failure, history, coarse=coarse))
 
 
 def of(verdict, name):
+    """Return the record of a criterion in a verdict."""
     return next(record for record in verdict["criteria"] if record["name"] == name)
 
 

@@ -14,12 +14,14 @@ PADS = [SimpleNamespace(name=f"A{k}", x=k * 1e-3, y=2.5e-3) for k in (1, 2, 3, 4
 
 
 def joint(width, verdict="ok"):
+    """Return the record of a joint with a width [m] and a verdict."""
     values = {"max_width": width, "standoff": 3e-4, "width_error": 1e-3, "volume_drift": 0.0}
     return {"shape": "A1", "verdict": verdict, "metrics": {k: {"value": v, "unit": ""} for k, v in values.items()}}
 
 
 @pytest.fixture
 def records():
+    """Return the records of joints of which two touch and one is open."""
     joints = {"A1": joint(0.8e-3), "A2": joint(1.01e-3, "overflow"), "A3": joint(1.02e-3, "overflow")}
     joints["A4"] = joint(0.4e-3, "open")
     joints["A4"]["metrics"]["width_error"]["value"] = float("nan")
