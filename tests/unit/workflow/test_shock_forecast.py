@@ -95,7 +95,8 @@ def test_levels_along_a_path_have_layers_of_solder_with_the_copper():
 
 
 @pytest.mark.parametrize(
-    "setting", ["shock.coupling.levels=1", "shock.damping.stiffness_coefficient=1e-9 s", "shock.coupling.scheme=impulse"]
+    "setting",
+    ["shock.coupling.levels=1", "shock.damping.stiffness_coefficient=1e-9 s", "shock.coupling.scheme=impulse"],
 )
 def test_other_effects_exclude_levels_of_path_dependent_models(setting):
     shock = predicted(*PATH, setting)
