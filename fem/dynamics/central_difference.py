@@ -147,7 +147,8 @@ class ExplicitMotion(Motion):
     def take_steps(self, count: int, interface: Interface | None = None) -> None:
         """Take ``count`` steps; prescribed changes and impulses of the coupling interface are in ``interface``."""
         full_cycles = self._substep == 0 and count % self._longest == 0
-        if self.body.shared.exchanged or self._compiled is None or not full_cycles:
+        apart = self.body.shared.exchanged and self._longest > 1  # sums over ranks would have to follow the paces
+        if apart or self._compiled is None or not full_cycles:
             self._take_single_steps(count, interface)
             return
         times = [self.time]
