@@ -156,18 +156,16 @@ def compiled_form(form: ufl.Form, flags: list[str]):  # its type has another nam
     return dolfinx.fem.form(form, jit_options={"cffi_extra_compile_args": flags})
 
 
-def compile_ahead(comm: MPI.Comm, corners: NDArray[np.float64] | None) -> None:
-    """Let one rank compile the elements of the output before two communicators wait for one cache entry; collective.
+def compile_ahead(corners: NDArray[np.float64] | None) -> None:
+    """Let one rank compile the elements of the output before two communicators wait for one cache entry.
 
     Args:
-        comm: Communicator of all models, whose cells have one shape.
         corners: ``(k, 3)`` [m] nodes of a cell on that rank, None on the others.
     """
     if corners is not None:
         mesh = make_mesh(MPI.COMM_SELF, corners, np.arange(len(corners))[None, :])
         vector_space(mesh)
         cell_space(mesh)
-    comm.Barrier()
 
 
 class FieldFile:

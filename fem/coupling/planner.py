@@ -36,6 +36,7 @@ from reflowshock.fem.estimates.placement import (
 from reflowshock.fem.mesh.mesh import MeshData
 from reflowshock.fem.parallel.checkpoint_files import warn
 from reflowshock.fem.parallel.partition import partition
+from reflowshock.fem.parallel.waiting import wait_for_all
 from reflowshock.fem.problem.inputs import RunInput, StructureInput
 from reflowshock.fem.problem.shock import Ranks
 from reflowshock.fem.setup.models import DividedModels
@@ -138,6 +139,7 @@ def plan_ranks(
     plan = plan_from(loads, family, ranks, measured, overlap) if world.rank == 0 else None
     if plan:
         print(words(plan), flush=True)
+    wait_for_all(world)
     shared = world.bcast((plan.placement, plan.summary) if plan else None)
     return plan or Plan(shared[0], {}, shared[1])
 

@@ -104,6 +104,9 @@ def _some_cells(mesh: MeshData, chosen: NDArray[np.int64], count: int) -> MeshDa
 def measured_costs(world: MPI.Comm, chosen: Mapping[int, tuple[MeshData, MeshData, Kind]]) -> StepCost:
     """Time a small and a large sample of each family on all ranks simultaneously, as in a run; collective.
 
+    Ranks of one machine have equal costs, the least of them: they are not bound to cores, so that a difference is a
+    disturbance by other programs.
+
     Args:
         world: Communicator of all ranks.
         chosen: Index of a family in ``FAMILIES`` -> its small and large sample, and how its elements are computed.
@@ -112,13 +115,16 @@ def measured_costs(world: MPI.Comm, chosen: Mapping[int, tuple[MeshData, MeshDat
         Costs of shape (ranks, 5), zero for families without a sample.
     """
     fixed, element = np.zeros(len(FAMILIES)), np.zeros(len(FAMILIES))
+    machine = world.Split_type(MPI.COMM_TYPE_SHARED)
     for number, (small, large, kind) in chosen.items():
         terms = [sample_terms(sample, kind) for sample in (small, large)]
         world.Barrier()
         first, second = (
-            seconds_of_step(term, len(mesh.points)) for term, mesh in zip(terms, (small, large), strict=True)
+            machine.allreduce(seconds_of_step(term, len(mesh.points)), MPI.MIN)
+            for term, mesh in zip(terms, (small, large), strict=True)
         )
         fixed[number], element[number] = fit_step_cost(len(small.cells), first, len(large.cells), second)
+    machine.Free()
     return StepCost(np.array(world.allgather(fixed)), np.array(world.allgather(element)))
 
 

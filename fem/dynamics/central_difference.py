@@ -160,7 +160,8 @@ class ExplicitMotion(Motion):
     def _take_undamped_steps(self, count: int, interface: Interface | None) -> None:
         """Take steps by compiled code if no message, load or rest of a cycle forbids it."""
         full_cycles = self._substep == 0 and count % self._longest == 0
-        if self.body.shared.exchanged or self._compiled is None or not full_cycles:
+        apart = self.body.shared.exchanged and self._longest > 1  # sums over ranks would have to follow the paces
+        if apart or self._compiled is None or not full_cycles:
             self._take_single_steps(count, interface)
             return
         times = [self.time]

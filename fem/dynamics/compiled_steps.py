@@ -1,4 +1,8 @@
-"""All steps of a window in one compiled call, if no message and no nodal load acts between them."""
+"""Compiled calls for all steps of a window, if no nodal load acts between them.
+
+A model on one rank takes all steps in one call. A model on several ranks takes one step in a call, since the forces at
+shared nodes are summed after each step.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,6 +21,7 @@ from reflowshock.fem.kernels.levels import (
     Interface,
     PacedForces,
     StepArrays,
+    count_impulses,
     forces_of,
     paced_forces_of,
     take_steps,
@@ -117,7 +122,9 @@ class CompiledSteps:
         interface: Interface,
         accelerations: np.ndarray,
     ) -> float:
-        """Take m steps and advance the time of the motion.
+        """Take m steps and advance the time of the motion; collective over the ranks of the model.
+
+        On several ranks all force terms must act in every step.
 
         Args:
             motion: Motion that takes the steps.
@@ -139,6 +146,18 @@ class CompiledSteps:
             ends=self.ends,
             slave_force=motion.slave_force,
         )
+        shared, last = motion.body.shared, len(accelerations) - 1
+        if not shared.exchanged:
+            return self._call(motion, steps, interface, accelerations)
+        work = 0.0
+        for k in range(last):
+            work += self._call(motion, steps, _step_of(interface, k), accelerations[k : k + 2])
+            shared.add(steps.state[2])
+        count_impulses(interface, last, steps.state[2])
+        return work
+
+    def _call(self, motion: Motion, steps: StepArrays, interface: Interface, accelerations: np.ndarray) -> float:
+        """Take steps in one call, with forces of this rank only; return the work of the body acceleration [J]."""
         work, taken, which, block, pace = take_steps(steps, self.forces, interface, accelerations, motion.step)
         for _ in range(taken):
             motion.time += motion.step
@@ -146,6 +165,16 @@ class CompiledSteps:
             error: InvertedElementError = self.terms[pace][NAMES[which]].inverted(block, motion.displacement)
             raise error
         return float(work)
+
+
+def _step_of(interface: Interface, substep: int) -> Interface:
+    """Return the interface for a call that takes step ``substep`` (from 0) of a window.
+
+    Its impulses count the force before the step only, since the force after the step is not yet summed over ranks.
+    """
+    weights = np.zeros((2, 2))
+    weights[0] = interface.weights[substep]
+    return interface._replace(change=interface.change[substep : substep + 1], weights=weights)
 
 
 def acts_at_nodes(load: Load) -> bool:

@@ -15,6 +15,7 @@ from reflowshock.fem.dynamics.participant import Participant
 from reflowshock.fem.parallel.checkpoint_state import Log, Same, State
 from reflowshock.fem.parallel.communicators import Role
 from reflowshock.fem.parallel.rank_activity import ACTIVITY
+from reflowshock.fem.parallel.waiting import wait_for_all
 
 
 class Watch(Protocol):
@@ -91,6 +92,7 @@ class History:
     def _combine(self, part: NDArray[np.float64], operation: MPI.Op = MPI.SUM) -> NDArray[np.float64]:
         result = np.empty_like(part)
         ACTIVITY.wait_for("the sums of a sample, with all ranks")
+        wait_for_all(self._world)
         self._world.Allreduce(part, result, operation)
         ACTIVITY.go_on()
         return result

@@ -18,6 +18,7 @@ from reflowshock.fem.model.stress_recovery import StressRecovery
 from reflowshock.fem.parallel.checkpoint_state import Log, State
 from reflowshock.fem.parallel.communicators import Role
 from reflowshock.fem.parallel.rank_activity import ACTIVITY
+from reflowshock.fem.parallel.waiting import wait_for_all
 
 
 def picture_windows(times: Iterable[float], plan: WindowPlan) -> frozenset[int]:
@@ -61,6 +62,7 @@ class JointInterfaceStress:
             stress[rows] = von_mises(recovery.stress(motion.displacement - motion.base_displacement()))
             time = motion.time
         ACTIVITY.wait_for("the stress at the interface of joints, with all ranks")
+        wait_for_all(self._world)
         self._world.Allreduce(MPI.IN_PLACE, stress)
         ACTIVITY.go_on()
         if self._world.rank == 0:

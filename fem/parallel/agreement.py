@@ -6,6 +6,7 @@ from typing import TypeVar
 from mpi4py import MPI
 
 from reflowshock.fem.errors import AgreedError
+from reflowshock.fem.parallel.waiting import wait_for_all
 
 Result = TypeVar("Result")
 
@@ -29,6 +30,7 @@ def agreed(comm: MPI.Comm, work: Callable[[], Result]) -> Result:
     except Exception as caught:  # any error must reach the other ranks; it is raised again below
         error = caught
         failure = f"{type(caught).__name__}: {caught}"
+    wait_for_all(comm)
     failures = dict.fromkeys(message for message in comm.allgather(failure) if message)
     if failures:
         raise AgreedError("; ".join(failures)) from error

@@ -34,6 +34,7 @@ from reflowshock.fem.parallel.checkpoint_files import (
 )
 from reflowshock.fem.parallel.checkpoint_state import ENTRIES, State
 from reflowshock.fem.parallel.rank_activity import ACTIVITY
+from reflowshock.fem.parallel.waiting import wait_for_all
 from reflowshock.sources import MATERIALS, digest_of_sources
 
 LIBRARIES = ("numpy", "scipy", "numba")
@@ -117,6 +118,7 @@ class Checkpoints:
         if self._folder is None:
             return False
         ACTIVITY.wait_for("the decision of rank 0 whether a checkpoint is due")
+        wait_for_all(self._comm)
         due = bool(self._comm.bcast(monotonic() - self._written >= self._interval))
         ACTIVITY.go_on()
         return due
@@ -127,7 +129,7 @@ class Checkpoints:
             return
         header = Header(self._owner, self._comm.size, window, time, tuple(self._extras))
         write_state(self._run_folder / STATE.format(rank=self._comm.rank, generation=self._generation), header, state)
-        self._comm.Barrier()  # no rank may overwrite its older file before all have the newer one
+        wait_for_all(self._comm)  # no rank may overwrite its older file before all have the newer one
         self.latest = Checkpoint(window, True, self._run_folder, self._generation, self._comm.size, time)
         if self._comm.rank == 0:
             _remove_others(self._run_folder)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from reflowshock.fem.kernels.motion import pack, sum_in_rank_order, unpack
 from reflowshock.fem.parallel.rank_activity import ACTIVITY
+from reflowshock.fem.parallel.waiting import wait_for
 
 SHARED_TAG, CHANNEL_TAG = 11, 12
 
@@ -99,7 +100,7 @@ class SharedNodes:
             packed = time.perf_counter()
             ACTIVITY.wait_for(self._mark)
             MPI.Prequest.Startall(self._requests)
-            MPI.Prequest.Waitall(self._requests)
+            wait_for(self._requests)
             ACTIVITY.go_on()
             arrived = time.perf_counter()
             sum_in_rank_order(self._nodes, self._pointer, self._source, self._received, values)
@@ -209,7 +210,7 @@ class Channel:
         MPI.Prequest.Startall(self._sends)
         if self._receiver_waits:
             ACTIVITY.wait_for(self._sending)
-            MPI.Prequest.Waitall(self._sends)
+            wait_for(self._sends)
             ACTIVITY.go_on()
         self.clock.count(begin, packed, time.perf_counter())
 
@@ -220,8 +221,7 @@ class Channel:
         self._copied[1][:] = self._copied[0]
         packed = time.perf_counter()
         ACTIVITY.wait_for(self._receiving)
-        MPI.Prequest.Waitall(self._receives)
-        MPI.Prequest.Waitall(self._sends)
+        wait_for([*self._receives, *self._sends])
         ACTIVITY.go_on()
         arrived = time.perf_counter()
         unpack(self._received, self._in_rows, values)

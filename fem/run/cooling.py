@@ -21,6 +21,7 @@ from reflowshock.fem.output.cooling_report import Convergence, CooledPackage, wr
 from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.parallel.local_mesh import distribute
 from reflowshock.fem.parallel.rank_activity import ACTIVITY
+from reflowshock.fem.parallel.waiting import wait_for_all
 from reflowshock.fem.problem.inputs import CoolingInput
 from reflowshock.fem.setup.models import Model
 from reflowshock.fem.statics.equilibrium import Equilibrium, Statics
@@ -105,7 +106,8 @@ def _distribute_model(
     world: MPI.Comm, mesh: MeshData | None, tables: JointTables, request: CoolingInput
 ) -> RankElements:
     """Distribute the mesh and assign materials to the elements of each rank; collective."""
-    dolfinx_api.compile_ahead(world, mesh.points[mesh.cells[0]] if mesh else None)
+    dolfinx_api.compile_ahead(mesh.points[mesh.cells[0]] if mesh else None)
+    wait_for_all(world)
     local = distribute(world, mesh)
     formulation = request.shock.numerics.formulation
     return agreed(world, lambda: make_rank_elements(local, tables, request.materials, formulation))

@@ -24,6 +24,7 @@ from reflowshock.fem.parallel.checkpoint import Checkpoints
 from reflowshock.fem.parallel.checkpoint_state import State
 from reflowshock.fem.parallel.communicators import Role
 from reflowshock.fem.parallel.rank_activity import ACTIVITY
+from reflowshock.fem.parallel.waiting import wait_for_all
 
 PROGRESS_INTERVAL = 0.5  # [s] between two progress lines
 FLATTENED = "the time step holds for undeformed elements; reduce numerics.step_fraction for strong compression"
@@ -139,6 +140,7 @@ def is_over(world: MPI.Comm, outputs: Outputs) -> bool:
     if outputs.is_over is None:
         return False
     ACTIVITY.wait_for("the decision of rank 0 whether the run is over")
+    wait_for_all(world)
     over = bool(world.bcast(outputs.is_over(outputs.history) if world.rank == 0 else None))
     ACTIVITY.go_on()
     return over

@@ -19,6 +19,7 @@ from reflowshock.fem.model.steps import Steps
 from reflowshock.fem.parallel.agreement import agreed
 from reflowshock.fem.parallel.communicators import Communicators, Role
 from reflowshock.fem.parallel.local_mesh import distribute
+from reflowshock.fem.parallel.waiting import wait_for_all
 from reflowshock.fem.problem.inputs import RunInput, StructureInput
 from reflowshock.fem.problem.kinematics import Kinematics
 from reflowshock.fem.statics.initial_state import InitialState
@@ -110,7 +111,8 @@ def distribute_models(
     """
     parts = _send_meshes(comms, divided, ranks)
     first_mesh = next(iter(divided.meshes.values()), None)
-    dolfinx_api.compile_ahead(comms.world, first_mesh.points[first_mesh.cells[0]] if first_mesh else None)
+    dolfinx_api.compile_ahead(first_mesh.points[first_mesh.cells[0]] if first_mesh else None)
+    wait_for_all(comms.world)
     meshes = {role: distribute(comms.models[role], *part) for role, part in parts.items()}
 
     def rank_elements_of(role: Role) -> RankElements:
