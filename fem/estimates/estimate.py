@@ -188,5 +188,5 @@ def predict_seconds(
     cost = WindowCost(ModelCost(board, WINDOW_OVERHEAD, 1), ModelCost(work, calls, sums), message)
     two_scale = least_seconds(ranks, cost)
     everything = board + sum(elements for elements, _ in meso) / UPDATES_PER_SECOND
-    dns = plan.substeps * (everything / ranks.total + (ranks.total > 1) * (STEP_OVERHEAD + LATENCY)) + CALL_OVERHEAD
+    dns = plan.substeps * (everything / ranks.most + (ranks.most > 1) * (STEP_OVERHEAD + LATENCY)) + CALL_OVERHEAD
     return plan.windows * two_scale, plan.windows * dns

@@ -135,7 +135,7 @@ def least_seconds(ranks: Ranks, cost: WindowCost) -> float:
         ranks: Number of ranks, all of speed one, and allowed placements.
         cost: Cost of the window for both models.
     """
-    size, seconds = ranks.total, []
+    size, seconds = ranks.most, []
     if ranks.placement != "disjoint":
         macro, meso = (model_seconds(model, size, size > 1, cost.latency) for model in (cost.macro, cost.meso))
         seconds.append(_together(cost, macro, meso, 2.0 * (size > 1)))
@@ -185,14 +185,14 @@ def model_seconds(cost: ModelCost, speed: float, several: bool, latency: float) 
 
 
 def check_size(ranks: Ranks, size: int) -> None:
-    """Check that the number of MPI ranks equals ``ranks.total`` of the input.
+    """Check that the number of MPI ranks is one that ``ranks.total`` of the input allows.
 
     Args:
         ranks: Rank settings of the input.
         size: Number of MPI ranks of the run.
 
     Raises:
-        RankError: The numbers differ.
+        RankError: The input asks for another number, or for ranks of each model and there is only one.
     """
-    if size != ranks.total:
+    if not (size == ranks.total or (ranks.total == "auto" and size >= ranks.least)):
         raise RankError(f"the input asks for {ranks.total} ranks (ranks.total), mpirun started {size}")

@@ -17,6 +17,7 @@ from reflowshock.parameters import Parameters
 from reflowshock.quantity import Quantity
 
 MOST_RANKS = 100_000  # of one run
+AUTO_RANKS = 2  # largest number that "auto" takes: one drop has too little work for more
 MOST_LEVELS = 4  # below the window, that "auto" tries
 JOINT_LAYER = 25e-6  # [m] of fatigue practice (Darveaux, ECTC 2000); thickness conventions differ
 ServiceCondition = Literal["A", "B", "C", "D", "E", "F", "G", "H"]
@@ -25,19 +26,31 @@ ServiceCondition = Literal["A", "B", "C", "D", "E", "F", "G", "H"]
 class Ranks(Parameters):
     """MPI ranks of a run, and their division between the models.
 
+    With ``total = auto`` a run has two ranks if two cores are idle when it starts, otherwise one.
     With ``disjoint`` each model has its own ranks and both models advance at the same time; ``macro`` is the number of
     ranks of the macro model. With ``shared`` all ranks compute both models in turn. ``auto`` takes the placement
     predicted to be fastest from speeds measured at the start of the run.
     """
 
-    total: int = Field(2, ge=1, le=MOST_RANKS)
+    total: Literal["auto"] | Annotated[int, Field(ge=1, le=MOST_RANKS)] = "auto"
     placement: Literal["auto", "disjoint", "shared"] = "auto"
     macro: int | None = Field(None, ge=1, le=MOST_RANKS)
+
+    @property
+    def most(self) -> int:
+        """Largest number of ranks."""
+        return AUTO_RANKS if self.total == "auto" else self.total
+
+    @property
+    def least(self) -> int:
+        """Smallest number of ranks."""
+        alone = 1 if self.placement != "disjoint" else AUTO_RANKS
+        return alone if self.total == "auto" else self.total
 
     @field_validator("placement")
     @classmethod
     def _ranks_for_each(cls, value: str, info: ValidationInfo) -> str:
-        if value == "disjoint" and info.data.get("total", 2) < 2:
+        if value == "disjoint" and info.data.get("total") == 1:
             raise PydanticCustomError(
                 "inadmissible", "needs at least one rank for each model", {"allowed": "auto, shared"}
             )
@@ -48,8 +61,10 @@ class Ranks(Parameters):
     def _rank_for_meso(cls, value: int | None, info: ValidationInfo) -> int | None:
         if value is not None and info.data.get("placement", "disjoint") != "disjoint":
             raise PydanticCustomError("inadmissible", "applies only to placement = disjoint", {"allowed": "none"})
-        if value is not None and value >= info.data.get("total", math.inf):
-            allowed = f"< {info.data['total']}, shock.ranks.total"
+        total = info.data.get("total", math.inf)
+        most = AUTO_RANKS if total == "auto" else total
+        if value is not None and value >= most:
+            allowed = f"< {most}, shock.ranks.total"
             raise PydanticCustomError("inadmissible", "leaves no rank for the meso model", {"allowed": allowed})
         return value
 

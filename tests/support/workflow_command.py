@@ -13,7 +13,7 @@ from reflowshock.workflow.package.case import BOARD_DROP
 from tests.support.warm_start import warm_command
 
 # Settings without influence on results: changing them must not rerun any stage.
-WHO_COMPUTES = {"reflow.ranks"}
+WHO_COMPUTES = {"reflow.ranks", "shock.ranks.total", "shock.ranks.placement", "shock.ranks.macro"}
 SMALL_CASE = Path(__file__).resolve().parents[1] / "pipeline" / "small.toml"
 
 

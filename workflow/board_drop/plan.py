@@ -11,6 +11,7 @@ from reflowshock.workflow.board_drop.shock_forecast import ShockForecast
 from reflowshock.workflow.case.text import duration, short
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.process.environment import available_cores
+from reflowshock.workflow.process.rank_count import decide_ranks
 from reflowshock.workflow.process.terminal import REFLOW_SPEED, new_table, style_text
 
 SETTLES = "ends half a swing of the board after the largest stress of the joints"
@@ -83,7 +84,7 @@ def _expected(shock: ShockForecast, seconds: float) -> str:
 
 
 def _shock(case: BoardDropCase, shock: ShockForecast, search: float) -> Table:
-    rank_count = case.shock.ranks.total
+    rank_count = case.ranks
     table = new_table("\nShock", "what", "value", "remark")
     table.add_row("scheme", shock.scheme.replace("_", " "), shock.reason)
     table.add_row("fine joints", *_fine_joints(case))
@@ -135,6 +136,9 @@ def _fine_joints(case: BoardDropCase) -> tuple[str, str]:
 def _placement(case: BoardDropCase) -> str:
     """Return the placement of the models on the MPI ranks, as text."""
     ranks, cores = case.shock.ranks, f"on {available_cores()} cores"
+    if ranks.total == "auto":
+        now = decide_ranks(case.least_ranks, case.ranks, available_cores())
+        return f"for {ranks.most} ranks, {cores}; decided when it starts, now {now}"
     if ranks.total == 1:
         return f"one rank, {cores}"
     if ranks.placement == "shared":

@@ -170,7 +170,7 @@ def seconds_outside_windows(case: "BoardDropCase", parts: Parts, share: float = 
     """
     elements, numerics = sum(part.elements for part in parts.values()), case.shock.numerics
     histories, fields = share * numerics.history_samples, share * numerics.field_samples
-    shared = elements / case.shock.ranks.total * (histories * SAMPLE_SECONDS + fields * FIELD_SECONDS)
+    shared = elements / case.shock.ranks.most * (histories * SAMPLE_SECONDS + fields * FIELD_SECONDS)
     return SECONDS_TO_START + SETUP_SECONDS * elements + histories * SECONDS_OF_SAMPLE + shared
 
 

@@ -54,13 +54,18 @@ class Case(Parameters):
 
     @property
     def ranks(self) -> int:
-        """Number of MPI ranks of the package fem."""
+        """Number of MPI ranks of the package fem, the largest one if the run decides."""
         return 1
 
     @property
+    def least_ranks(self) -> int:
+        """Smallest number of MPI ranks; less than ``ranks`` if the run decides by idle cores."""
+        return self.ranks
+
+    @property
     def ranks_by_key(self) -> dict[str, int]:
-        """Numbers of MPI ranks of the stages, by dotted key."""
-        return {self.ranks_key: self.ranks} if self.ranks_key else {}
+        """Least numbers of MPI ranks of the stages, by dotted key."""
+        return {self.ranks_key: self.least_ranks} if self.ranks_key else {}
 
     @classmethod
     def completed(cls, table: dict) -> dict:

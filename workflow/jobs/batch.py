@@ -310,15 +310,20 @@ def write_jobs(store: Store, jobs: Sequence[Job], machine: Machine) -> None:
 
 
 def _threads(job: Job, jobs: Sequence[Job], machine: Machine, resources: Jobs) -> int:
-    """Return the cores of a job: the ranks of a shock, an equal share for each reflow, one for other stages."""
+    """Return the cores of a job: the ranks of a shock, an equal share for each reflow, one for other stages.
+
+    Of several shocks each has its least number of ranks, since together they use the cores better.
+    """
     if machine.slurm:
         return resources[job.stage]["cpus_per_task"] if job.stage in resources else 1
     if machine.exclusive and job.is_of_companion:
         return max(1, machine.cores // sum(other.stage == job.stage for other in jobs))
     if machine.exclusive:
         return machine.cores
+    alike = sum(other.stage == job.stage for other in jobs)
     if job.stage == "shock":
-        return min(machine.cores, job.point.case.ranks)
+        case = job.point.case
+        return min(machine.cores, case.ranks if alike == 1 else case.least_ranks)
     if job.stage == "reflow":
-        return max(1, machine.cores // sum(other.stage == job.stage for other in jobs))
+        return max(1, machine.cores // alike)
     return 1

@@ -57,6 +57,7 @@ HEATED = tuple(
 )  # fmt: skip
 STRUCTURE_ROLES = tuple(f"materials.{role}" for role in ("board", "substrate", "die", "copper"))
 JUDGED_BY = ("shock.failure",)  # changes only the verdict, so histories stay valid
+RANKS = "shock.ranks"  # results on different numbers of ranks differ by rounding only
 COOLED = ("thermal.solidification", "thermal.final", "thermal.effects.residual_stress")
 
 
@@ -86,7 +87,7 @@ def package_pipeline(heated: bool, dropped: bool, estimated: bool = False) -> Pi
     )
     surface = Stage("surface", GIVEN, ("reflow",), ("surface/surfaces.json",))
     moved = ("shock", "materials", *BoardFittings.model_fields, *COOLED)
-    shock = Stage("shock", moved, ("solder_mesh",), (), without=JUDGED_BY)
+    shock = Stage("shock", moved, ("solder_mesh",), (), without=(*JUDGED_BY, RANKS))
     motion = (*((shock,) if dropped else ()), *((ERRORS,) if estimated else ()))
     stages = (geometry, reflow, surface, solder_mesh, *motion)
     follows = tuple(stage.name for stage in stages)
@@ -237,5 +238,10 @@ class BoardDropCase(PackageCase, BoardFittings):
 
     @property
     def ranks(self) -> int:
-        """MPI ranks of the shock."""
-        return self.shock.ranks.total
+        """MPI ranks of the shock, the largest number if the run decides."""
+        return self.shock.ranks.most
+
+    @property
+    def least_ranks(self) -> int:
+        """Smallest number of MPI ranks of the shock."""
+        return self.shock.ranks.least

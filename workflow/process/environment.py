@@ -48,6 +48,7 @@ MINIMUM_LIMITS = (
 )
 MINIMUM_FILES = 64
 TARGET_FILES = 4096
+GROUP, UNLIMITED = Path("/sys/fs/cgroup"), 1e9
 MINIMUM_THREADS, AMPLE_THREADS = 24, 1000
 
 
@@ -274,5 +275,20 @@ def _home_of_user() -> str:
 
 
 def available_cores() -> int:
-    """Return the number of cores that this process may use."""
-    return len(os.sched_getaffinity(0))
+    """Return the number of cores that this process may use, at least one."""
+    return max(1, min(len(os.sched_getaffinity(0)), int(group_cores())))
+
+
+def group_cores(group: Path = GROUP) -> float:
+    """Return the number of cores that the control group of a container grants; 1e9 without a limit.
+
+    Args:
+        group: Folder of the control group, of version 2 (``cpu.max``) or 1 (``cpu/cpu.cfs_quota_us``).
+    """
+    with suppress(OSError, ValueError):
+        quota, period = (group / "cpu.max").read_text().split()
+        return UNLIMITED if quota == "max" else float(quota) / float(period)
+    with suppress(OSError, ValueError):
+        quota, period = ((group / f"cpu/cpu.cfs_{name}_us").read_text() for name in ("quota", "period"))
+        return UNLIMITED if float(quota) <= 0.0 else float(quota) / float(period)
+    return UNLIMITED

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from reflowshock.workflow.case.run import Run
 from reflowshock.workflow.process.launch import PATIENCE, launch, mpi_command
+from reflowshock.workflow.process.rank_count import decide_ranks
 from reflowshock.workflow.process.terminal import progress_bar
 
 WATCHDOG_MARGIN = 10.0  # [s]
@@ -30,9 +31,9 @@ def run_fem(run: Run, folder: Path, request: dict, title: str) -> None:
     folder.mkdir()
     path = folder / "input.json"
     path.write_text(json.dumps(request | {"output": str(folder.resolve())}, indent=1) + "\n", encoding="utf-8")
-    ranks = run.case.ranks
-    command = mpi_command(ranks, [sys.executable, "-m", "reflowshock.fem", str(path)], run.oversubscribe)
-    with progress_bar(f"{title} on {ranks} rank{'s' if ranks > 1 else ''}") as progress:
+    decided = decide_ranks(run.case.least_ranks, run.case.ranks, run.cores)
+    command = mpi_command(decided.ranks, [sys.executable, "-m", "reflowshock.fem", str(path)], run.oversubscribe)
+    with progress_bar(f"{title} on {decided}") as progress:
         launch(command, lambda line: _handle_line(line, progress), folder / "log.txt", _patience(request))
 
 

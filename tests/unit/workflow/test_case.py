@@ -10,6 +10,7 @@ from reflowshock.materials.library import SAC305
 from reflowshock.workflow.case.fields import display_values
 from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.pipeline.reader import read_case
+from reflowshock.workflow.process import environment
 from reflowshock.workflow.process.environment import available_cores
 from tests.support.workflow_command import SMALL_CASE
 
@@ -229,8 +230,11 @@ def test_values_are_shown_in_the_units_of_users():
     assert values["shock.numerics.modes"] == "[two_scale, dns]"
 
 
-def test_cores_are_those_of_this_process():
+def test_cores_are_those_of_this_process(monkeypatch):
+    monkeypatch.setattr(environment, "group_cores", lambda: 1e9)
     assert available_cores() == len(os.sched_getaffinity(0))
+    monkeypatch.setattr(environment, "group_cores", lambda: 0.5)
+    assert available_cores() == 1
 
 
 def test_of_many_problems_the_first_are_shown(tmp_path):

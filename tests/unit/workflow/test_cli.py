@@ -79,6 +79,12 @@ def test_a_plan_for_scripts(call):
     assert plan["effects"]["gravity"]["why"]
 
 
+def test_a_plan_says_how_many_ranks_a_run_would_have_now(call):
+    code, output, _ = call("plan", str(CASE), "--set", "scale=quick", "--set", "shock.ranks.total=auto")
+    assert code == 0
+    assert "decided when it starts, now" in " ".join(output.replace("│", " ").split())
+
+
 def test_a_dry_run_is_a_plan(call, tmp_path):
     output = call("run", str(CASE), "--set", "scale=quick", "--dry-run")
     assert output == call("plan", str(CASE), "--set", "scale=quick")

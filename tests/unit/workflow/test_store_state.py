@@ -29,6 +29,7 @@ RERUN = {
     "package.die.thickness=0.3 mm": ("geometry", "solder_mesh", "shock", "report"),
     "board.numerics.coarse_size=4 mm": ("geometry", "solder_mesh", "shock", "report"),
     "case.title=Another": ("report",),
+    "shock.ranks.total=1": (),
     "shock.failure.board_deflection.component=leadless": ("report",),
 }
 
