@@ -8,22 +8,20 @@ import json
 import os
 import subprocess
 import sys
-import time
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from datetime import date
 from math import exp, log
-from pathlib import Path
 from statistics import fmean
 
 from reflowshock.workflow.process.kernel_folder import kernel_folder
+from reflowshock.workflow.process.rank_count import core_times, idle_between
 
 FILE = "speed.json"
 LONG = 30.0  # shortest predicted stage after which the machine is measured [s]
 IDLE = 0.25  # cores that others may use during a measurement
 PATIENCE = 300.0  # [s] for a measurement, most of it for kernels that a case did not need
 UNMEASURED = "Steps are assumed to be as fast as on the reference machine; this machine is measured after a long shock."
-STAT = Path("/proc/stat")
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +32,7 @@ class MachineSpeed:
         slowness: Time of an element update over that of the reference machine, geometric mean of the element families.
         families: The same of each family.
         date: Day of the measurement, ISO format.
-        busy: Number of cores that other programs used.
+        busy: Number of cores of the program that others used.
     """
 
     slowness: float
@@ -74,20 +72,12 @@ def measure_after(predicted: float) -> None:
     former, folder = machine_speed(), kernel_folder()
     if predicted < LONG or folder is None or (former is not None and former.busy <= IDLE):
         return
-    before, begin = _busy_seconds(), time.perf_counter()
+    before, allowed = core_times(), os.sched_getaffinity(0)
     command = [sys.executable, "-m", "reflowshock.fem.run.calibrate"]
     with suppress(OSError, ValueError, subprocess.SubprocessError):  # without it, forecasts stay those of the reference
         done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=True)
         families = json.loads(done.stdout)
-        busy = (_busy_seconds() - before) / (time.perf_counter() - begin) - 1.0
+        busy = len(allowed) - idle_between(before, core_times(), allowed) - 1.0
         mean = exp(fmean(log(value) for value in families.values()))
         speed = MachineSpeed(mean, families, date.today().isoformat(), max(busy, 0.0))
         (folder / FILE).write_text(json.dumps(asdict(speed), indent=1) + "\n", encoding="utf-8")
-
-
-def _busy_seconds() -> float:
-    """Return the time that all cores have been busy since the start of the system [s]; zero if it is unknown."""
-    if not STAT.is_file():
-        return 0.0
-    user, nice, system = STAT.read_text(encoding="ascii").split("\n", 1)[0].split()[1:4]
-    return (int(user) + int(nice) + int(system)) / os.sysconf("SC_CLK_TCK")
