@@ -41,7 +41,7 @@ BAD_VALUES = {
     "value for a table": ("materials.solder=1 GPa", ["materials.solder", "must be a table"]),
     "unknown material": (
         "materials.solder=SAC306",
-        ["materials.solder", "one of FR4, copper,", "did you mean SAC305?"],
+        ["materials.solder", "one of FR4, FR4_board,", "did you mean SAC305?"],
     ),
     "unbalanced orthotropic constants": (
         "materials.board.poisson_ratio_out_of_plane=1.2",
