@@ -18,6 +18,7 @@ from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.store.companions import COARSEST, HALF_WINDOW, SIZES, size_name
 
 COARSE_JOINTS = "solder_coarse"  # part of the mesh
+LEAST_END = 0.5  # least duration of one model, over that of two, for an error of two scales
 CHEAP = 0.25  # largest cost of one model on the coarsest mesh, over that of the shock of the run
 
 
@@ -52,9 +53,9 @@ def drop_companions(case: BoardDropCase, shock: Path | None) -> dict[str, BoardD
 
 
 def compares_models(case: BoardDropCase, end: float) -> bool:
-    """Return whether a run computes one model, too, until its end [s]."""
+    """Return whether a run until its end [s] computes one model, too, for most of its time."""
     numerics = case.shock.numerics
-    return {"two_scale", "dns"} <= set(numerics.modes) and (numerics.dns_duration or end) >= end
+    return {"two_scale", "dns"} <= set(numerics.modes) and (numerics.dns_duration or end) >= LEAST_END * end
 
 
 def drop_sizes(case: BoardDropCase, shock: Path) -> dict[str, float]:

@@ -1,8 +1,8 @@
 """Stage that estimates the errors of a run from its companions: discretisation, and two scales against one model.
 
 Each figure has an observed order and the grid convergence index of ``grid_convergence.py``. The error of two scales is
-the relative difference from one model on the same mesh, at the size of the run or of the coarsest companion, or from
-half the coupling window. A failed companion leaves these errors unknown, with its message.
+the relative difference from one model on the same mesh, of the run or of the coarsest companion, or from half the
+coupling window. A failed companion leaves these errors unknown, with its message.
 """
 
 from collections.abc import Callable, Mapping
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from reflowshock.workflow.case.run import Findings, Run, metric
+from reflowshock.workflow.convergence.drop_companions import LEAST_END
 from reflowshock.workflow.convergence.figures import divergent_figures
 from reflowshock.workflow.convergence.grid_convergence import grid_convergence
 from reflowshock.workflow.process.products import read_json, write_json
@@ -29,9 +30,9 @@ from reflowshock.workflow.store.product import read_record
 FILE = "errors.json"
 MODELS = ("two_scale", "explicit", "implicit", "dns")  # folders of results in a shock, the first model first
 ONE_MODEL = MODELS[-1]
-SAME_END = 1e-6  # largest relative difference of the ends of two models
+ROUNDING = 1e-6  # of the ends of two models
 
-Figures = Callable[[Path, Path], Mapping[str, float]]
+Figures = Callable[[Path, Path, float | None], Mapping[str, float]]
 Sizes = Callable[[Any, Path], Mapping[str, float]]
 
 
@@ -86,7 +87,8 @@ def estimate_errors(figures: Figures, sizes: Sizes, run: Run[Any], folder: Path)
     """Write ``errors.json``: the errors of the figures of a shock; return the cost of its companions.
 
     Args:
-        figures: Function from the folder of a model and that of the first model of the run to the figures.
+        figures: Function from the folder of a model, that of the first model of the run, and an end [s] or None, to the
+            figures.
         sizes: Function from the case and its shock to the realised element size of each companion.
         run: Run folder with the shock and its companions.
         folder: Folder of the product.
@@ -96,28 +98,23 @@ def estimate_errors(figures: Figures, sizes: Sizes, run: Run[Any], folder: Path)
     names = [size_name(size) for size in sorted(SIZES, reverse=True)]
     coarser = [_coarser(figures, run.folder, name, realised[name], main) for name in names]
     two_scales = _two_scales(figures, run.folder, main)
-    errors = {name: _error(name, value, coarser, two_scales) for name, value in figures(main, main).items()} | {
+    errors = {name: _error(name, value, coarser, two_scales) for name, value in figures(main, main, None).items()} | {
         name: FigureError(None, None, None, "grows with refinement", "") for name in divergent_figures(main)
     }
     write_json(folder / FILE, {name: asdict(error) for name, error in errors.items()})
     return Findings(metrics=_cost_share(run.folder))
 
 
-def models_of(shock: Path) -> list[Path]:
-    """Return the folders of the results of a shock, the first model first."""
-    return [folder for model in MODELS if (folder := shock / model).is_dir()]
-
-
 def first_model(shock: Path) -> Path:
     """Return the folder of the results of the first model of a shock."""
-    return models_of(shock)[0]
+    return next(folder for model in MODELS if (folder := shock / model).is_dir())
 
 
 def _coarser(figures: Figures, run_folder: Path, name: str, size: float, main: Path) -> _Coarser:
     """Return a companion of a realised size with its figures, or with the reason why they are missing."""
     if failure := _failure(run_folder, name):
         return _Coarser(size, failure=failure)
-    return _Coarser(size, figures(first_model(companion_folder(run_folder, name) / UNTIL), main))
+    return _Coarser(size, figures(first_model(companion_folder(run_folder, name) / UNTIL), main, None))
 
 
 def _error(name: str, value: float, coarser: list[_Coarser], two_scales: TwoScales) -> FigureError:
@@ -143,38 +140,38 @@ def _unknown(name: str, value: float, coarser: list[_Coarser]) -> str:
 
 
 def _two_scales(figures: Figures, run_folder: Path, main: Path) -> TwoScales:
-    """Return the errors of two scales of a run, from the nearest comparison that has been computed."""
+    """Return the errors of two scales of a run: relative differences from another computation of the same mesh."""
     if not _has_two_scales(main):
         return TwoScales()
-    if (one := _one_model(main.parent)) is not None:
-        return TwoScales(_differences(figures(main, main), figures(one, main)), "one model on the same mesh")
+    compared = _compared(run_folder, main)
+    if isinstance(compared, str):
+        return TwoScales(how=compared)
+    ours, reference, how = compared
+    end = _end(reference) if _end(reference) < (1.0 - ROUNDING) * _end(ours) else None
+    expected = figures(reference, main, end)
+    values = figures(ours, main, end)
+    errors = {name: abs(value / expected[name] - 1.0) for name, value in values.items() if expected.get(name)}
+    return TwoScales(errors, how if end is None else f"{how}, until {1e3 * end:.3g} ms")
+
+
+def _compared(run_folder: Path, main: Path) -> tuple[Path, Path, str] | str:
+    """Return two results of the same mesh that differ by their scales, and the difference in words; or why not."""
+    if (one := main.parent / ONE_MODEL).is_dir() and _end(one) >= LEAST_END * _end(main):
+        return main, one, "one model on the same mesh"
     if failed := _failure(run_folder, COARSEST):
-        return TwoScales(how=failed)
+        return failed
     coarsest = first_model(companion_folder(run_folder, COARSEST) / UNTIL)
-    if (one := _one_model(coarsest.parent)) is not None:
-        how = f"one model, {companion_title(COARSEST)}"
-        return TwoScales(_differences(figures(coarsest, main), figures(one, main)), how)
+    if (one := coarsest.parent / ONE_MODEL).is_dir():
+        return coarsest, one, f"one model, {companion_title(COARSEST)}"
     if failed := _failure(run_folder, HALF_WINDOW):
-        return TwoScales(how=failed)
+        return failed
     halved = first_model(companion_folder(run_folder, HALF_WINDOW) / UNTIL)
-    how = f"change by half the window, {companion_title(COARSEST)}"
-    return TwoScales(_differences(figures(coarsest, main), figures(halved, main)), how)
-
-
-def _differences(ours: Mapping[str, float], reference: Mapping[str, float]) -> dict[str, float]:
-    """Return the relative differences of figures from those of a reference, by name."""
-    return {name: abs(value / reference[name] - 1.0) for name, value in ours.items() if reference.get(name)}
+    return coarsest, halved, f"change by half the window, {companion_title(COARSEST)}"
 
 
 def _has_two_scales(results: Path) -> bool:
     """Return whether results are those of two coupled models."""
     return "scheme" in read_json(results / "result.json").get("coupling", {})
-
-
-def _one_model(shock: Path) -> Path | None:
-    """Return the folder of the single model in a shock that ends with the first model; None without one."""
-    first, one = first_model(shock), shock / ONE_MODEL
-    return one if one != first and one.is_dir() and _end(one) >= (1.0 - SAME_END) * _end(first) else None
 
 
 def _end(results: Path) -> float:

@@ -29,7 +29,6 @@ from tests.support.products import make, record_of
 from tests.support.workflow_command import SMALL_CASE
 
 ESTIMATE = ["numerics.error.method=estimate"]
-JEDEC = SMALL_CASE.parents[2] / "cases/jedec_bga/case.toml"
 
 
 def drop(*settings: str) -> BoardDropCase:
@@ -127,19 +126,24 @@ def test_companions_stay_in_the_run_folder(store):
         assert remove_unused(store) == (0, 0)
 
 
-def shock_of(folder: Path, value: float, model: str = "two_scale") -> None:
+def shock_of(folder: Path, value: float, model: str = "two_scale", windows: int = 300) -> None:
     """Write results of a model of two joints, the second of which is critical on the finest mesh only."""
     results = folder / model
     results.mkdir(parents=True)
     load = np.array([[0.0, 0.0], [3.0, value]])
     sections = np.zeros((2, 2, 6))
     histories = {f"{name}_{end}": load for name in ("peel", "von_mises", "outer_fibre") for end in ("board", "package")}
+    histories |= {
+        "time": np.array([0.0, 1.5e-5]),
+        "board_strain": 1e-3 * load[:, 1],
+        "board_centre": sections[0, :, :3],
+    }
     histories |= {f"section_{end}": sections for end in ("board", "package")}
     np.savez(results / "history.npz", joints=np.array(["A1", "A2"]), **histories)
     metrics = {"critical_joint": metric("A2" if value > 3.0 else "A1"), "peak_element_stress": metric(value, "Pa")}
     metrics |= {"peak_board_strain": metric(1e-3 * value)}
     coupling = {"scheme": "held_velocity"} if model == "two_scale" else {}
-    model_record = {"window": 1e-7, "windows": 300}
+    model_record = {"window": 1e-7, "windows": windows}
     (results / "result.json").write_text(
         json.dumps({"metrics": metrics, "coupling": coupling, "model": model_record}), encoding="utf-8"
     )
@@ -185,6 +189,16 @@ def test_errors_are_those_of_the_critical_joint_of_the_run(tmp_path):
     assert record["how"] == "order 2; two scales: one model on the same mesh"
 
 
+@pytest.mark.parametrize(
+    ("windows", "how"), [(200, "one model on the same mesh, until 0.02 ms"), (100, "elements x 2")]
+)
+def test_one_model_that_ends_early_counts_for_half_of_the_run(windows, how, tmp_path):
+    run_with_companions(tmp_path)
+    shock_of(tmp_path / "shock", 3.6, "dns", windows)
+    shock_of(companion_folder(tmp_path, COARSEST) / "shock", 2.5, "dns")
+    assert how in estimated(tmp_path)["peak_board_strain"]["two_scale_how"]
+
+
 def test_two_scales_are_compared_with_one_model_on_the_coarsest_mesh(tmp_path):
     run_with_companions(tmp_path)
     shock_of(companion_folder(tmp_path, COARSEST) / "shock", 2.5, "dns")
@@ -207,11 +221,12 @@ def test_a_missing_companion_leaves_the_errors_unknown(tmp_path):
     assert error["two_scale"] is None and error["two_scale_how"] == "the run with elements x 2: has not run"
 
 
-def test_one_model_on_the_coarsest_mesh_runs_only_where_it_is_cheap():
-    alone = 'shock.numerics.modes=["two_scale"]'
-    dear, cheap = drop_companions(drop(alone), None), drop_companions(read_case(JEDEC, ["scale=quick"]), None)
-    half = dear[HALF_WINDOW].shock.numerics
+def test_one_model_on_the_coarsest_mesh_runs_only_where_it_is_cheap(monkeypatch):
+    alone = drop('shock.numerics.modes=["two_scale"]')
+    half = drop_companions(alone, None)[HALF_WINDOW].shock.numerics
     assert half.step_fraction == 0.5 * CASE.shock.numerics.step_fraction and half.modes == ("two_scale",)
+    monkeypatch.setattr("reflowshock.workflow.convergence.drop_companions.CHEAP", 2.0)
+    cheap = drop_companions(alone, None)
     assert HALF_WINDOW not in cheap and cheap[COARSEST].shock.numerics.modes == ("two_scale", "dns")
     assert list(drop_companions(drop('shock.numerics.modes=["dns"]'), None)) == list(map(size_name, SIZES))
 
@@ -251,11 +266,13 @@ def test_two_scales_of_a_structure_need_a_companion_unless_the_run_compares_them
     coupled = structure_companions(structure(*COUPLED), None)
     assert coupled[HALF_WINDOW].dynamics.numerics.step_fraction == pytest.approx(0.45)
     compared = structure_companions(structure(*COUPLED[:2], "dynamics.coupling={fine=['cover'], compare=true}"), None)
-    assert HALF_WINDOW not in compared and not compared[COARSEST].dynamics.coupling.compare
+    coupling = compared[COARSEST].dynamics.coupling
+    assert HALF_WINDOW not in compared and coupling is not None and not coupling.compare
 
 
 def test_a_structure_with_an_exact_solution_has_no_companions(tmp_path):
     case = read_case(SMALL_CASE.parents[2] / "cases/cantilever/case.toml")
+    assert isinstance(case, StructureCase)
     assert "errors" not in case.pipeline.names and not structure_companions(case, None)
     record_of(tmp_path / "comparison", metrics={"tip_deflection_error": metric(-0.01), "tip_deflection": metric(1.0)})
     assert discretisation(tmp_path, case).record({}) == {
