@@ -1,12 +1,19 @@
-"""Companions of a structure: the same motion on two coarser meshes, and if needed with half the coupling window."""
+"""Companions of a structure: the same motion on two coarser meshes, and if needed with half the coupling window.
 
-from math import prod
+Fewer than four elements along an axis stay, because they cannot be coarsened by 1.5: a plate with one element over its
+thickness would have no bending strain at the middle of the element.
+"""
+
+from collections.abc import Sequence
+from math import floor, prod
 from pathlib import Path
 
+from reflowshock.fem.problem.structure import Layer
 from reflowshock.parameters import Values, with_values
 from reflowshock.workflow.store.companions import COARSEST, HALF_WINDOW, SIZES, size_name
 from reflowshock.workflow.structure.case import StructureCase
 
+FEWEST = 4  # smallest number of elements along an axis that companions coarsen
 CHEAP = 0.25  # largest cost of one model on the coarsest mesh, over that of the shock of the run
 
 
@@ -52,10 +59,12 @@ def _elements_along_axes(case: StructureCase) -> tuple[int, int, int]:
 
 def _coarser(case: StructureCase, size: float) -> StructureCase:
     """Return a structure with larger elements, and time steps that grow with them, of the first solver alone."""
-    numerics, solver = case.dynamics.numerics, case.dynamics.solvers[0]
+    numerics, solver, body = case.dynamics.numerics, case.dynamics.solvers[0], case.structure.refined
     values: Values = {
         "numerics.error.method": "off",
-        "structure.refine": case.structure.refine / size,
+        "structure.refine": 1.0,
+        "structure.cells": _fewer(body.cells, size),
+        "structure.layers": {name: _coarser_layer(layer, size) for name, layer in body.layers.items()},
         "dynamics.solver": solver,
         "dynamics.ranks": 1,
         "dynamics.numerics.field_samples": 2,
@@ -72,6 +81,17 @@ def _coarser(case: StructureCase, size: float) -> StructureCase:
             "dynamics.coupling.macro_ranks": None,
         }
     return with_values(case, values)
+
+
+def _coarser_layer(layer: Layer, size: float) -> Layer:
+    """Return a layer with larger elements."""
+    (cells,), in_plane = _fewer((layer.cells,), size), layer.in_plane and _fewer(layer.in_plane, size)
+    return with_values(layer, {"cells": cells, "in_plane": in_plane})
+
+
+def _fewer(counts: Sequence[int], size: float) -> tuple[int, ...]:
+    """Return numbers of elements divided by their relative size and rounded; small numbers stay."""
+    return tuple(count if count < FEWEST else floor(count / size + 0.5) for count in counts)
 
 
 def _implicit_step(case: StructureCase) -> float:
