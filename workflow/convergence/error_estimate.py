@@ -6,13 +6,14 @@ coupling window. A failed companion leaves these errors unknown, with its messag
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from reflowshock.units import from_si
 from reflowshock.workflow.case.run import Findings, Run, metric
 from reflowshock.workflow.convergence.drop_companions import LEAST_END
-from reflowshock.workflow.convergence.figures import divergent_figures
+from reflowshock.workflow.convergence.figures import divergent_figures, reading_distances
 from reflowshock.workflow.convergence.grid_convergence import grid_convergence
 from reflowshock.workflow.process.products import read_json, write_json
 from reflowshock.workflow.store.companions import (
@@ -98,7 +99,8 @@ def estimate_errors(figures: Figures, sizes: Sizes, run: Run[Any], folder: Path)
     names = [size_name(size) for size in sorted(SIZES, reverse=True)]
     coarser = [_coarser(figures, run.folder, name, realised[name], main) for name in names]
     two_scales = _two_scales(figures, run.folder, main)
-    errors = {name: _error(name, value, coarser, two_scales) for name, value in figures(main, main, None).items()} | {
+    errors = {name: _error(name, value, coarser, two_scales) for name, value in figures(main, main, None).items()}
+    errors = _with_distances(errors, reading_distances(run.case, main)) | {
         name: FigureError(None, None, None, "grows with refinement", "") for name in divergent_figures(main)
     }
     write_json(folder / FILE, {name: asdict(error) for name, error in errors.items()})
@@ -125,6 +127,14 @@ def _error(name: str, value: float, coarser: list[_Coarser], two_scales: TwoScal
     sizes, values = [mesh.size for mesh in coarser], [mesh.figures[name] for mesh in coarser]
     found = grid_convergence([*sizes, 1.0], [*values, value])
     return FigureError(found.index / abs(value), found.order, scheme, found.how, two_scales.how)
+
+
+def _with_distances(errors: Mapping[str, FigureError], distances: Mapping[str, float]) -> dict[str, FigureError]:
+    """Return the errors with a remark on each figure that is read away from its watch point, at a distance [m]."""
+    remarks = {name: f"; read {from_si(distance, 'mm', 2)} from the point" for name, distance in distances.items()}
+    return {
+        name: replace(error, how=error.how + remarks.get(name.partition("@")[2], "")) for name, error in errors.items()
+    }
 
 
 def _unknown(name: str, value: float, coarser: list[_Coarser]) -> str:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from reflowshock.fem.output.ranking import joint_figures
 from reflowshock.workflow.process.products import read_json
@@ -14,6 +14,7 @@ BOARD = ("peak_board_strain", "peak_board_displacement")
 AT_POINTS = ("peak_acceleration@", "peak_displacement@", "peak_strain@", "peak_strain_rate@")
 OF_STRUCTURE = (*AT_POINTS, "displacement_range@", "peak_von_mises@", "peak_reaction@")
 ROUNDING = 1e-9
+NEAR = 1e-4  # distance of a node from a watch point that counts as none [m]
 FREQUENCY = "_frequency"
 NOT_CONVERGENT = "peak_element_stress"  # grows with refinement, as do its values of layers after an @
 
@@ -49,6 +50,26 @@ def structure_figures(results: Path, _main: Path, _end: float | None = None) -> 
         results: Folder of the results of one model.
     """
     return _chosen(results, lambda name: name.startswith(OF_STRUCTURE) or name.endswith(FREQUENCY))
+
+
+def reading_distances(case: Any, results: Path) -> dict[str, float]:
+    """Return the distance of each watch point from the node at which a run reads it, by name [m].
+
+    Only points that are farther than a tenth of a millimetre from their node are included: there a finer mesh reads
+    another place, which the companions may not show.
+
+    Args:
+        case: Case with watch points.
+        results: Folder of the results of one model.
+    """
+    import numpy as np
+
+    with np.load(results / "history.npz") as arrays:
+        nodes = dict(zip(arrays["watch"].tolist(), arrays["watch_points"], strict=True)) if "watch" in arrays else {}
+    distances = {
+        name: float(np.linalg.norm(node - case.watch[name].at)) for name, node in nodes.items() if name in case.watch
+    }
+    return {name: distance for name, distance in distances.items() if distance > NEAR}
 
 
 def divergent_figures(results: Path) -> list[str]:

@@ -12,7 +12,7 @@ from reflowshock.workflow.case.run import Run, metric
 from reflowshock.workflow.convergence.discretisation import NOT_RUN, OFF, discretisation
 from reflowshock.workflow.convergence.drop_companions import drop_companions, drop_sizes
 from reflowshock.workflow.convergence.error_estimate import FILE, estimate_errors
-from reflowshock.workflow.convergence.figures import drop_figures
+from reflowshock.workflow.convergence.figures import drop_figures, reading_distances
 from reflowshock.workflow.convergence.structure_companions import structure_companions, structure_sizes
 from reflowshock.workflow.jobs.batch import list_missing, prepare, show_products
 from reflowshock.workflow.package.case import BoardDropCase
@@ -197,6 +197,21 @@ def test_one_model_that_ends_early_counts_for_half_of_the_run(windows, how, tmp_
     shock_of(tmp_path / "shock", 3.6, "dns", windows)
     shock_of(companion_folder(tmp_path, COARSEST) / "shock", 2.5, "dns")
     assert how in estimated(tmp_path)["peak_board_strain"]["two_scale_how"]
+
+
+def test_a_figure_read_away_from_its_point_says_so(tmp_path):
+    run_with_companions(tmp_path)
+    path = tmp_path / "shock/two_scale/history.npz"
+    with np.load(path) as arrays:
+        histories = dict(arrays)
+    place = np.array([[0.0175, 0.0, 0.0]])
+    np.savez(path, watch=np.array(["edge"]), watch_points=place, **histories)
+    assert reading_distances(CASE, path.parent) == {"edge": pytest.approx(5e-4)}
+    result = path.parent / "result.json"
+    results = json.loads(result.read_text())
+    results["metrics"]["peak_strain@edge"] = metric(1e-3)
+    result.write_text(json.dumps(results))
+    assert estimated(tmp_path)["peak_strain@edge"]["how"] == "zero, or not in all runs; read 0.5 mm from the point"
 
 
 def test_two_scales_are_compared_with_one_model_on_the_coarsest_mesh(tmp_path):
