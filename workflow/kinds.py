@@ -127,17 +127,17 @@ def _conclude_structure(run_folder: Path, case: StructureCase, summary: dict, er
 
 
 def _drop_errors(run: Run, folder: Path) -> Findings:
-    from reflowshock.workflow.convergence.error_estimate import estimate_errors
-    from reflowshock.workflow.convergence.figures import drop_figures
+    from reflowshock.workflow.convergence.error_estimate import Reading, estimate_errors
+    from reflowshock.workflow.convergence.figures import drop_family, drop_figures
 
-    return estimate_errors(drop_figures, drop_sizes, run, folder)
+    return estimate_errors(Reading(drop_figures, drop_sizes, drop_family), run, folder)
 
 
 def _structure_errors(run: Run, folder: Path) -> Findings:
-    from reflowshock.workflow.convergence.error_estimate import estimate_errors
+    from reflowshock.workflow.convergence.error_estimate import Reading, estimate_errors
     from reflowshock.workflow.convergence.figures import structure_figures
 
-    return estimate_errors(structure_figures, structure_sizes, run, folder)
+    return estimate_errors(Reading(structure_figures, structure_sizes), run, folder)
 
 
 def _structure_report(run_folder: Path, case: StructureCase, context: dict, summary: dict) -> None:

@@ -1,6 +1,7 @@
 """Stage that estimates the errors of a run from its companions: discretisation, and two scales against one model.
 
-Each figure has an observed order and the grid convergence index of ``grid_convergence.py``. The error of two scales is
+Each figure has an observed order and the grid convergence index of ``grid_convergence.py``, in a drop at least the
+median of its family: the figures of the joint, or deflections and strains of the board. The error of two scales is
 the relative difference from one model on the same mesh, of the run or of the coarsest companion, or from half the
 coupling window. A failed companion leaves these errors unknown, with its message.
 """
@@ -8,6 +9,7 @@ coupling window. A failed companion leaves these errors unknown, with its messag
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from reflowshock.units import from_si
@@ -84,22 +86,37 @@ class _Coarser:
     failure: str = ""
 
 
-def estimate_errors(figures: Figures, sizes: Sizes, run: Run[Any], folder: Path) -> Findings:
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """Reading of the figures of a kind of case.
+
+    Attributes:
+        figures: Function from the folder of a model, that of the first model of the run, and an end [s] or None, to the
+            figures by name.
+        sizes: Function from the case and its shock to the realised element size of each companion.
+        family: Function from the name of a figure to its family in words, empty without a family.
+    """
+
+    figures: Figures
+    sizes: Sizes
+    family: Callable[[str], str] = lambda _name: ""
+
+
+def estimate_errors(reading: Reading, run: Run[Any], folder: Path) -> Findings:
     """Write ``errors.json``: the errors of the figures of a shock; return the cost of its companions.
 
     Args:
-        figures: Function from the folder of a model, that of the first model of the run, and an end [s] or None, to the
-            figures.
-        sizes: Function from the case and its shock to the realised element size of each companion.
+        reading: Figures of the kind of case.
         run: Run folder with the shock and its companions.
         folder: Folder of the product.
     """
     main = first_model(run.folder / UNTIL)
-    realised = sizes(run.case, run.folder / UNTIL)
+    figures, realised = reading.figures, reading.sizes(run.case, run.folder / UNTIL)
     names = [size_name(size) for size in sorted(SIZES, reverse=True)]
     coarser = [_coarser(figures, run.folder, name, realised[name], main) for name in names]
     two_scales = _two_scales(figures, run.folder, main)
     errors = {name: _error(name, value, coarser, two_scales) for name, value in figures(main, main, None).items()}
+    errors = _with_families(errors, reading.family)
     errors = _with_distances(errors, reading_distances(run.case, main)) | {
         name: FigureError(None, None, None, "grows with refinement", "") for name in divergent_figures(main)
     }
@@ -127,6 +144,26 @@ def _error(name: str, value: float, coarser: list[_Coarser], two_scales: TwoScal
     sizes, values = [mesh.size for mesh in coarser], [mesh.figures[name] for mesh in coarser]
     found = grid_convergence([*sizes, 1.0], [*values, value])
     return FigureError(found.index / abs(value), found.order, scheme, found.how, two_scales.how)
+
+
+def _with_families(errors: Mapping[str, FigureError], family: Callable[[str], str]) -> dict[str, FigureError]:
+    """Return errors of at least the median of their family.
+
+    A figure that happens to change little between three meshes is not more accurate than the others of its mesh.
+    """
+    members: dict[str, list[float]] = {}
+    for name, error in errors.items():
+        if family(name) and error.discretisation is not None:
+            members.setdefault(family(name), []).append(error.discretisation)
+    medians = {name: median(values) for name, values in members.items()}
+
+    def raised(name: str, error: FigureError) -> FigureError:
+        least = medians.get(family(name), 0.0)
+        if error.discretisation is None or error.discretisation >= least:
+            return error
+        return replace(error, discretisation=least, how=f"median of the figures of {family(name)}; alone {error.how}")
+
+    return {name: raised(name, error) for name, error in errors.items()}
 
 
 def _with_distances(errors: Mapping[str, FigureError], distances: Mapping[str, float]) -> dict[str, FigureError]:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 BOARD = ("peak_board_strain", "peak_board_displacement")
 AT_POINTS = ("peak_acceleration@", "peak_displacement@", "peak_strain@", "peak_strain_rate@")
+DEFLECTIONS = AT_POINTS[1:]  # without accelerations, which hardly depend on the mesh
 OF_STRUCTURE = (*AT_POINTS, "displacement_range@", "peak_von_mises@", "peak_reaction@")
 ROUNDING = 1e-9
 NEAR = 1e-4  # distance of a node from a watch point that counts as none [m]
@@ -50,6 +51,13 @@ def structure_figures(results: Path, _main: Path, _end: float | None = None) -> 
         results: Folder of the results of one model.
     """
     return _chosen(results, lambda name: name.startswith(OF_STRUCTURE) or name.endswith(FREQUENCY))
+
+
+def drop_family(name: str) -> str:
+    """Return the family of a figure of a drop whose figures share the errors of one mesh; empty without a family."""
+    if name in BOARD or name.startswith(DEFLECTIONS):
+        return "the board"
+    return "" if "@" in name else "the joint"
 
 
 def reading_distances(case: Any, results: Path) -> dict[str, float]:

@@ -11,8 +11,8 @@ from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.run import Run, metric
 from reflowshock.workflow.convergence.discretisation import NOT_RUN, OFF, discretisation
 from reflowshock.workflow.convergence.drop_companions import drop_companions, drop_sizes
-from reflowshock.workflow.convergence.error_estimate import FILE, estimate_errors
-from reflowshock.workflow.convergence.figures import drop_figures, reading_distances
+from reflowshock.workflow.convergence.error_estimate import FILE, Reading, estimate_errors
+from reflowshock.workflow.convergence.figures import drop_family, drop_figures, reading_distances
 from reflowshock.workflow.convergence.structure_companions import structure_companions, structure_sizes
 from reflowshock.workflow.jobs.batch import list_missing, prepare, show_products
 from reflowshock.workflow.package.case import BoardDropCase
@@ -159,7 +159,7 @@ def estimated(folder: Path) -> dict:
     """Return ``errors.json`` of a run folder."""
     made = folder / "errors"
     made.mkdir()
-    found = estimate_errors(drop_figures, nominal_sizes, Run(folder, CASE, 1), made)
+    found = estimate_errors(Reading(drop_figures, nominal_sizes, drop_family), Run(folder, CASE, 1), made)
     assert found.metrics["companion_cost_share"]["value"] >= 0.0 and found.health == {}
     errors: dict = json.loads((made / FILE).read_text())
     return errors
@@ -199,6 +199,25 @@ def test_one_model_that_ends_early_counts_for_half_of_the_run(windows, how, tmp_
     assert how in estimated(tmp_path)["peak_board_strain"]["two_scale_how"]
 
 
+def add_metric(shock: Path, name: str, value: float) -> None:
+    """Add a metric to the results of the first model of a shock."""
+    path = shock / "two_scale/result.json"
+    results = json.loads(path.read_text())
+    results["metrics"][name] = metric(value)
+    path.write_text(json.dumps(results))
+
+
+def test_a_figure_that_hardly_changes_has_the_median_error_of_its_family(tmp_path):
+    run_with_companions(tmp_path)
+    for folder in (tmp_path, *(companion_folder(tmp_path, size_name(size)) for size in SIZES)):
+        add_metric(folder / "shock", "peak_displacement@edge", 1e-3)
+        add_metric(folder / "shock", "peak_acceleration@edge", 1e3)
+    errors = estimated(tmp_path)
+    assert errors["peak_displacement@edge"]["discretisation"] == pytest.approx(0.5 * 1.25 * 0.5 / 3.5)
+    assert errors["peak_displacement@edge"]["how"].startswith("median of the figures of the board; alone the same")
+    assert errors["peak_acceleration@edge"]["discretisation"] == 0.0
+
+
 def test_a_figure_read_away_from_its_point_says_so(tmp_path):
     run_with_companions(tmp_path)
     path = tmp_path / "shock/two_scale/history.npz"
@@ -207,10 +226,7 @@ def test_a_figure_read_away_from_its_point_says_so(tmp_path):
     place = np.array([[0.0175, 0.0, 0.0]])
     np.savez(path, watch=np.array(["edge"]), watch_points=place, **histories)
     assert reading_distances(CASE, path.parent) == {"edge": pytest.approx(5e-4)}
-    result = path.parent / "result.json"
-    results = json.loads(result.read_text())
-    results["metrics"]["peak_strain@edge"] = metric(1e-3)
-    result.write_text(json.dumps(results))
+    add_metric(tmp_path / "shock", "peak_strain@edge", 1e-3)
     assert estimated(tmp_path)["peak_strain@edge"]["how"] == "zero, or not in all runs; read 0.5 mm from the point"
 
 
