@@ -1,7 +1,6 @@
 """Drop on a coarser mesh, for estimates of discretisation errors and for the search for critical joints.
 
-Layers of board, substrate, die and copper and those of the averaging layer of a joint stay, because so few elements
-cannot be coarsened by 1.5.
+The search keeps the layers of board, substrate, die and copper and those of the averaging layer of a joint.
 """
 
 from math import floor
@@ -38,7 +37,7 @@ def needs_search(case: BoardDropCase) -> bool:
 
 
 def coarser(case: BoardDropCase, size: float) -> Values:
-    """Return the values that multiply the element size of a case: dotted key -> value in SI units."""
+    """Return the values that multiply the element size along board and package: dotted key -> value in SI units."""
     board, package, numerics = case.board.numerics, case.package, case.package.joint_numerics
     values: Values = {
         "board.numerics.element_size": size * board.element_size,
@@ -57,6 +56,21 @@ def coarser(case: BoardDropCase, size: float) -> Values:
         }
     step = case.shock.numerics.mass_scaled_step
     return values if step is None else values | {"shock.numerics.mass_scaled_step": size * step}
+
+
+def fewer_layers(case: BoardDropCase, size: float) -> Values:
+    """Return the values that multiply the element size across all layers: dotted key -> value in SI units."""
+    board, package, numerics = case.board.numerics, case.package, case.package.joint_numerics
+    layers = rounded_count(board.layers, size)
+    return {
+        "board.numerics.layers": layers,
+        "board.numerics.patch_layers": max(1, round(layers * board.patch_layers / board.layers)),
+        "package.substrate.elements": rounded_count(package.substrate.elements, size),
+        "package.die.elements": rounded_count(package.die.elements, size),
+        f"{JOINTS}.layers": max(2, rounded_count(numerics.layers, size)),
+        f"{JOINTS}.pad_layers": rounded_count(numerics.pad_layers, size),
+        f"{JOINTS}.copper_layers": rounded_count(numerics.copper_layers, size),
+    }
 
 
 def rounded_count(elements: int, size: float) -> int:

@@ -4,20 +4,18 @@ The fine joints and the end of a companion are those of the run. The coarsest co
 by one model of the same drop where that is cheap, otherwise by a further companion with half the window.
 """
 
-from math import sqrt
 from pathlib import Path
 
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.parameters import Values, with_values
 from reflowshock.workflow.board_drop.board_deflection import expected_duration
-from reflowshock.workflow.board_drop.coarser_case import coarser
+from reflowshock.workflow.board_drop.coarser_case import coarser, fewer_layers
 from reflowshock.workflow.board_drop.fine_joints import read_fine_joints
 from reflowshock.workflow.board_drop.shock_launch import MODES
 from reflowshock.workflow.package.case import BoardDropCase
 from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.store.companions import COARSEST, HALF_WINDOW, SIZES, size_name
 
-COARSE_JOINTS = "solder_coarse"  # part of the mesh
 LEAST_END = 0.5  # least duration of one model, over that of two, for an error of two scales
 CHEAP = 0.25  # largest cost of one model on the coarsest mesh, over that of the shock of the run
 
@@ -46,7 +44,9 @@ def drop_companions(case: BoardDropCase, shock: Path | None) -> dict[str, BoardD
         "shock.ranks.placement": "auto",
         "shock.ranks.macro": None,
     }
-    copies = {size_name(size): with_values(case, same | coarser(case, size)) for size in SIZES}
+    copies = {
+        size_name(size): with_values(case, same | coarser(case, size) | fewer_layers(case, size)) for size in SIZES
+    }
     if main == "two_scale" and not compares_models(case, end):
         copies |= _for_two_scales(with_values(case, {"shock.duration": end}), copies[COARSEST])
     return copies
@@ -58,26 +58,12 @@ def compares_models(case: BoardDropCase, end: float) -> bool:
     return {"two_scale", "dns"} <= set(numerics.modes) and (numerics.dns_duration or end) >= LEAST_END * end
 
 
-def drop_sizes(case: BoardDropCase, shock: Path) -> dict[str, float]:
-    """Return the realised size of the elements of each companion relative to the case, by name.
+def drop_sizes(_case: BoardDropCase, _shock: Path) -> dict[str, float]:
+    """Return the size of the elements of each companion relative to the case, by name.
 
-    Rounded numbers of elements differ from the nominal size. The layers of a companion stay, so that the size is the
-    square root of the ratio of the numbers of elements without coarse joints, which stay as well.
-
-    Args:
-        case: Case of the run.
-        shock: Product of its shock.
+    The parts of a drop round their numbers of elements differently, up or down, so that the nominal size is taken.
     """
-    elements = _elements(case)
-    return {name: sqrt(elements / _elements(copy)) for name, copy in drop_companions(case, shock).items()}
-
-
-def _elements(case: BoardDropCase) -> int:
-    """Return the number of elements of a drop without coarse joints."""
-    from reflowshock.workflow.board_drop.part_forecast import forecast_parts, two_scale_parts
-
-    parts = two_scale_parts(case) if "two_scale" in case.shock.numerics.modes else forecast_parts(case)
-    return sum(part.elements for name, part in parts.items() if name != COARSE_JOINTS)
+    return {size_name(size): size for size in SIZES}
 
 
 def _for_two_scales(case: BoardDropCase, coarsest: BoardDropCase) -> dict[str, BoardDropCase]:

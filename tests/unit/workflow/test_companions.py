@@ -56,7 +56,7 @@ def test_companions_have_larger_elements_and_share_the_solder():
     assert tuple(copies) == tuple(map(size_name, SIZES))
     for size, copy in zip(SIZES, copies.values(), strict=True):
         assert copy.board.numerics.element_size == pytest.approx(size * CASE.board.numerics.element_size)
-        assert copy.package.substrate == CASE.package.substrate
+        assert copy.package.substrate.elements == max(1, round(CASE.package.substrate.elements / size))
         assert (copy.shock.ranks.total, copy.shock.numerics.modes) == (1, ("two_scale",))
         assert "errors" not in copy.pipeline.names and not drop_companions(copy, None)
         keys = product_keys(copy)
@@ -64,10 +64,10 @@ def test_companions_have_larger_elements_and_share_the_solder():
         assert same == {"reflow", "surface"}
 
 
-def test_layers_of_the_averaging_layer_stay():
+def test_joints_have_fewer_layers_in_the_same_averaging_layer():
     resolved = drop("package.joint_numerics={layers=6, pad_layer='0.025 mm'}")
     numerics = drop_companions(resolved, None)[COARSEST].package.joint_numerics
-    assert (numerics.layers, numerics.pad_layers, numerics.core) == (6, 2, 1)
+    assert (numerics.layers, numerics.pad_layers, numerics.core, numerics.pad_layer) == (3, 1, 1, 25e-6)
 
 
 def test_fine_joints_and_end_are_those_of_the_run(tmp_path):
@@ -150,16 +150,11 @@ def shock_of(folder: Path, value: float, model: str = "two_scale", windows: int 
     record_of(folder)
 
 
-def nominal_sizes(_case, _shock) -> dict[str, float]:
-    """Return the sizes that element counts without rounding give."""
-    return {size_name(size): size for size in SIZES}
-
-
 def estimated(folder: Path) -> dict:
     """Return ``errors.json`` of a run folder."""
     made = folder / "errors"
     made.mkdir()
-    found = estimate_errors(Reading(drop_figures, nominal_sizes, drop_family), Run(folder, CASE, 1), made)
+    found = estimate_errors(Reading(drop_figures, drop_sizes, drop_family), Run(folder, CASE, 1), made)
     assert found.metrics["companion_cost_share"]["value"] >= 0.0 and found.health == {}
     errors: dict = json.loads((made / FILE).read_text())
     return errors
@@ -262,9 +257,7 @@ def test_one_model_on_the_coarsest_mesh_runs_only_where_it_is_cheap(monkeypatch)
     assert list(drop_companions(drop('shock.numerics.modes=["dns"]'), None)) == list(map(size_name, SIZES))
 
 
-def test_sizes_are_those_of_the_rounded_numbers_of_elements(tmp_path):
-    sizes = drop_sizes(CASE, tmp_path)
-    assert 1.4 < sizes["size_1.5"] < 1.6 and 1.7 < sizes[COARSEST] < 2.0
+def test_sizes_of_a_structure_are_those_of_its_rounded_numbers_of_elements(tmp_path):
     board = structure_sizes(structure("structure.cells=[12, 8]"), tmp_path)
     assert board == {"size_1.5": pytest.approx((1.5 * 1.6) ** 0.5), COARSEST: pytest.approx(2.0)}
 
