@@ -29,12 +29,27 @@ def drop_companions(case: BoardDropCase, shock: Path | None) -> dict[str, BoardD
     """
     if not case.estimates_errors:
         return {}
-    main = next(mode for mode in MODES if mode in case.shock.numerics.modes)
+    copies = {size_name(size): resized_drop(case, shock, size) for size in SIZES}
+    main = _main_mode(case)
     end = _end(case, shock, main)
+    if main == "two_scale" and not compares_models(case, end):
+        copies |= _for_two_scales(with_values(case, {"shock.duration": end}), copies[COARSEST])
+    return copies
+
+
+def resized_drop(case: BoardDropCase, shock: Path | None, size: float) -> BoardDropCase:
+    """Return a drop with elements of another size, with the fine joints and the end of the run.
+
+    Args:
+        case: Case of the run.
+        shock: Product of its shock; None before.
+        size: Size of all elements relative to the case.
+    """
+    main = _main_mode(case)
     same: Values = {
         "numerics.error.method": "off",
         "shock.coupling.fine_joints": _fine_joints(case, shock) if main == "two_scale" else "all",
-        "shock.duration": end,
+        "shock.duration": _end(case, shock, main),
         "shock.numerics.modes": (main,),
         "shock.numerics.dns_duration": None,
         "shock.numerics.field_samples": 2,
@@ -44,12 +59,12 @@ def drop_companions(case: BoardDropCase, shock: Path | None) -> dict[str, BoardD
         "shock.ranks.placement": "auto",
         "shock.ranks.macro": None,
     }
-    copies = {
-        size_name(size): with_values(case, same | coarser(case, size) | fewer_layers(case, size)) for size in SIZES
-    }
-    if main == "two_scale" and not compares_models(case, end):
-        copies |= _for_two_scales(with_values(case, {"shock.duration": end}), copies[COARSEST])
-    return copies
+    return with_values(case, same | coarser(case, size) | fewer_layers(case, size))
+
+
+def _main_mode(case: BoardDropCase) -> str:
+    """Return the first mode of a shock."""
+    return next(mode for mode in MODES if mode in case.shock.numerics.modes)
 
 
 def compares_models(case: BoardDropCase, end: float) -> bool:
