@@ -1,8 +1,13 @@
 """Base class of all parameter models."""
 
-from typing import Any
+from collections.abc import Mapping
+from functools import reduce
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict
+
+Values = dict[str, object]  # dotted key -> value in SI units
+Model = TypeVar("Model", bound=BaseModel)
 
 
 class Parameters(BaseModel):
@@ -21,3 +26,13 @@ def with_value(model: BaseModel, key: str, value: object) -> Any:
     """
     name, _, rest = key.partition(".")
     return model.model_copy(update={name: with_value(getattr(model, name), rest, value) if rest else value})
+
+
+def with_values(model: Model, values: Mapping[str, object]) -> Model:
+    """Return a copy of a model with other values at dotted keys, without validation.
+
+    Args:
+        model: Parameters; not changed.
+        values: Dotted key, e.g. "solder.numerics.spacing" -> new value, in SI units.
+    """
+    return reduce(lambda copy, item: with_value(copy, *item), values.items(), model)

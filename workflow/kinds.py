@@ -16,7 +16,6 @@ from reflowshock.particles.parameters.effects import LIQUID_EFFECTS
 from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop import problems as package_checks
 from reflowshock.workflow.board_drop import stages as package_stages
-from reflowshock.workflow.board_drop.companions import companions
 from reflowshock.workflow.board_drop.forecast import (
     board_drop_size,
     forecast_board_drop,
@@ -31,6 +30,8 @@ from reflowshock.workflow.case.problems import CaseError
 from reflowshock.workflow.case.run import Findings, Run, StageFunction
 from reflowshock.workflow.case.stage import ERRORS, SHOCK
 from reflowshock.workflow.convergence.convergence_study import ConvergenceStudy
+from reflowshock.workflow.convergence.drop_companions import drop_companions, drop_sizes
+from reflowshock.workflow.convergence.structure_companions import structure_companions, structure_sizes
 from reflowshock.workflow.flows.flow_kind import STAGE as FLOW_STAGE
 from reflowshock.workflow.flows.flow_kind import FlowCase, FlowKind
 from reflowshock.workflow.flows.forecast import flow_size, flow_tables, forecast_flow
@@ -78,7 +79,7 @@ class Kind:
         report: Function that adds sections to the context of a report: run folder, case, context, summary.
         study: Convergence study of a case.
         effects: Effects that may act.
-        companions: Companions of a case by element size, from the product of its shock; None before the shock.
+        companions: Companions of a case by name, from the product of its shock; None before the shock.
         conclude: Function that adds conclusions to a summary: run folder, case, summary, discretisation errors.
     """
 
@@ -92,7 +93,7 @@ class Kind:
     report: Callable[[Path, Any, dict, dict], None]
     study: Callable[[Any], ConvergenceStudy]
     effects: Sequence[Effect]
-    companions: Callable[[Any, Path | None], Mapping[float, Case]] = lambda case, shock: {}
+    companions: Callable[[Any, Path | None], Mapping[str, Case]] = lambda case, shock: {}
     conclude: Callable[[Path, Any, dict, Discretisation], None] = lambda folder, case, summary, errors: None
 
     @property
@@ -126,10 +127,18 @@ def _conclude_structure(run_folder: Path, case: StructureCase, summary: dict, er
     summary["verdict"] = verdict_of_structure()
 
 
-def _estimate_errors(run: Run, folder: Path) -> Findings:
-    from reflowshock.workflow.convergence.error_estimate import estimate_errors
+def _drop_errors(run: Run, folder: Path) -> Findings:
+    from reflowshock.workflow.convergence.error_estimate import Reading, estimate_errors
+    from reflowshock.workflow.convergence.figures import drop_family, drop_figures
 
-    return estimate_errors(run, folder)
+    return estimate_errors(Reading(drop_figures, drop_sizes, drop_family), run, folder)
+
+
+def _structure_errors(run: Run, folder: Path) -> Findings:
+    from reflowshock.workflow.convergence.error_estimate import Reading, estimate_errors
+    from reflowshock.workflow.convergence.figures import structure_figures
+
+    return estimate_errors(Reading(structure_figures, structure_sizes), run, folder)
 
 
 def _structure_report(run_folder: Path, case: StructureCase, context: dict, summary: dict) -> None:
@@ -247,7 +256,7 @@ BOARD_DROP = replace(
         **PACKAGE.stages,
         "solder_mesh": package_stages.solder_mesh_for_drop,
         "shock": package_stages.shock,
-        ERRORS.name: _estimate_errors,
+        ERRORS.name: _drop_errors,
     },
     forecast=forecast_board_drop,
     size=board_drop_size,
@@ -256,7 +265,7 @@ BOARD_DROP = replace(
     report=_board_drop_report,
     study=_board_drop_study,
     effects=(*PACKAGE.effects, *SHOCK_EFFECTS),
-    companions=companions,
+    companions=drop_companions,
     conclude=_conclude_drop,
 )
 STRUCTURE = Kind(
@@ -266,6 +275,7 @@ STRUCTURE = Kind(
         "geometry": structure_stages.geometry,
         "shock": structure_stages.shock,
         "comparison": structure_stages.comparison,
+        ERRORS.name: _structure_errors,
     },
     forecast=structure_forecast.forecast_structure,
     size=structure_forecast.structure_size,
@@ -274,6 +284,7 @@ STRUCTURE = Kind(
     report=_structure_report,
     study=_structure_study,
     effects=STRUCTURE_EFFECTS,
+    companions=structure_companions,
     conclude=_conclude_structure,
 )
 KINDS = (

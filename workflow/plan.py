@@ -18,7 +18,7 @@ from reflowshock.workflow.pipeline.gate import LONG
 from reflowshock.workflow.process.kernel_folder import compilation_time
 from reflowshock.workflow.process.machine_speed import UNMEASURED, machine_speed
 from reflowshock.workflow.process.terminal import new_table, style_text
-from reflowshock.workflow.store.companions import companion_name
+from reflowshock.workflow.store.companions import companion_title
 from reflowshock.workflow.store.keys import Change
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.state import StageState, examine, why_stale
@@ -70,7 +70,7 @@ def plan_record(store: Store, point: Point) -> dict[str, Any]:
         "case": point.case.case.name,
         "folder": str(store.folder),
         "stages": {name: asdict(stage) for name, stage in stages.items()},
-        "companions": {companion_name(size): seconds for size, seconds in companions.items()},
+        "companions": companions,
         "effects": dict(kind_of(point.case).forecast(point.case).effects),
         "compilation": once,
         "seconds": once_and_companions + sum(stage.seconds or 0.0 for stage in stages.values() if stage.runs),
@@ -153,7 +153,7 @@ def predicted_seconds(store: Store, point: Point, until: str) -> float:
     return sum(costs[name].seconds for name in stale) + companions + compilation_time(stale)
 
 
-def _companions(store: Store, point: Point, stale: Sequence[str]) -> dict[float, float]:
+def _companions(store: Store, point: Point, stale: Sequence[str]) -> dict[str, float]:
     """Predict the wall time of each companion that runs [s], if the stage that reads them is among stale stages."""
     return companion_seconds(store, point) if ERRORS.name in stale else {}
 
@@ -199,9 +199,9 @@ def _stages(store: Store, point: Point, seconds: Mapping[str, float]) -> Table:
     companions = _companions(store, point, [name for name, state in states.items() if state.stale])
     for name, state in states.items():
         if name == ERRORS.name and companions:
-            sizes = " and ".join(f"{size:g}" for size in companions)
+            titles = "; ".join(companion_title(name) for name in companions)
             cost = f"about {duration(at_once(companions.values()))}"
-            table.add_row("companions", style_text("[yellow]run[/]"), cost, f"elements x {sizes}, at once")
+            table.add_row("companions", style_text("[yellow]run[/]"), cost, f"{titles}, at once")
         mark = style_text("[yellow]run[/]" if state.stale else "[green]skip[/]")
         table.add_row(name, mark, str(costs[name]) if state.stale else "", reason(state, point.case))
     if once := compilation_time([name for name, state in states.items() if state.stale]):

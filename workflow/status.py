@@ -13,7 +13,7 @@ from reflowshock.workflow.case.text import duration
 from reflowshock.workflow.pipeline.companions import companion_points
 from reflowshock.workflow.process.progress_file import read_progress
 from reflowshock.workflow.process.terminal import style_text
-from reflowshock.workflow.store.companions import UNTIL
+from reflowshock.workflow.store.companions import UNTIL, companion_title
 from reflowshock.workflow.store.folders import is_busy
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.state import StageState, examine
@@ -72,8 +72,8 @@ def follow_run(store: Store, point: Point, console: Console) -> None:
 def _companion_progress(store: Store, point: Point) -> list[str]:
     """Return the progress of the shock of each companion as text, empty if it is not running."""
     companions = companion_points(store, point).items()
-    lines = {size: _progress(store, companion, UNTIL) for size, companion in companions}
-    return [f"elements x {size:g}, {line}" for size, line in lines.items() if line]
+    lines = {name: _progress(store, companion, UNTIL) for name, companion in companions}
+    return [f"{companion_title(name)}, {line}" for name, line in lines.items() if line]
 
 
 def _progress(store: Store, point: Point, stage: str) -> str:
@@ -107,9 +107,9 @@ def show_status(store: Store, point: Point, console: Console) -> None:
 
 def _add_companions(table: Table, store: Store, point: Point) -> None:
     """Add a row for the shock of each companion."""
-    for size, companion in companion_points(store, point).items():
+    for name, companion in companion_points(store, point).items():
         state = examine(store, companion)[UNTIL]
-        _add_row(table, store.record(companion, UNTIL), f"{UNTIL}, elements x {size:g}", UNTIL, state)
+        _add_row(table, store.record(companion, UNTIL), f"{UNTIL}, {companion_title(name)}", UNTIL, state)
 
 
 def _add_row(table: Table, record: dict | None, title: str, stage: str, state: StageState) -> None:

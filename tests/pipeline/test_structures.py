@@ -36,12 +36,14 @@ def test_both_solvers_of_a_board_from_case_file_to_report(tmp_path):
     result = command("run", "jedec_board", tmp_path, *COARSE_BOARD)
     assert result.returncode == 0, result.stdout + result.stderr
     summary = json.loads((tmp_path / "summary.json").read_text())
-    assert set(summary["timings"]["wall"]) == {"geometry", "shock", "comparison"}
+    assert set(summary["timings"]["wall"]) == {"geometry", "shock", "comparison", "errors"}
     assert set(summary["health"]) >= {
         "energy_balance_error", "implicit_energy_balance_error", "displacement_difference", "strain_difference",
         "frequency_1_low", "frequency_1_high",
     }  # fmt: skip
     assert summary["metrics"]["peak_strain@centre"]["value"] > 0.0
+    assert 0.0 < summary["errors"]["peak_displacement@centre"]["discretisation"] < 1.0
+    assert summary["errors"]["first_frequency"]["two_scale"] is None
     assert all(effect["why"] for effect in summary["effects"].values())
     page = (tmp_path / "report.html").read_text()
     assert page.count("data-figure=") >= 4 and page.count("data-scene=") == 2 and page.count("data:image/png") == 1

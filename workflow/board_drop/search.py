@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from reflowshock.workflow.board_drop.board_deflection import decided
-from reflowshock.workflow.board_drop.companions import needs_search, search_case
+from reflowshock.workflow.board_drop.coarser_case import needs_search, search_case
 from reflowshock.workflow.board_drop.fine_joints import (
     FineJoints,
     most_stressed,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from reflowshock.problem import Problem
 from reflowshock.workflow.board_drop.board_deflection import decided
-from reflowshock.workflow.board_drop.companions import needs_search, search_case
+from reflowshock.workflow.board_drop.coarser_case import needs_search, search_case
 from reflowshock.workflow.board_drop.duration import longest_duration
 from reflowshock.workflow.board_drop.part_forecast import (
     MACRO,

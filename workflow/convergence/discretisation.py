@@ -3,7 +3,9 @@
 The reported error is the grid convergence index of Roache, J. Fluids Eng. 116 (1994) 405.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from reflowshock.workflow.case.case import Case
 from reflowshock.workflow.case.stage import ERRORS
@@ -15,13 +17,18 @@ from reflowshock.workflow.convergence.grid_convergence import SAFETY, SAFETY_WIT
 from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.report.errors import Discretisation
 from reflowshock.workflow.store.keys import product_keys
+from reflowshock.workflow.store.product import read_record
 from reflowshock.workflow.store.store import HOME
+from reflowshock.workflow.structure.case import StructureCase
+from reflowshock.workflow.structure.references import ERRORS_OF_EXACT
 
 CASE_SIZE = 1.0  # element size relative to the case
 OFF = "numerics.error.method is off"
 NOT_RUN = "stage errors has not run"
 HEATED = "with [thermal] each coarser mesh would repeat the reflow; reflowshock accuracy measures it"
 STALE = "the case has changed since reflowshock accuracy was run; run it again"
+EXACT = "exact solution"
+NOT_COMPARED = "the exact solution does not give it"
 COARSEST = "reflowshock accuracy has not compared the mesh of the case with finer ones"
 
 
@@ -63,6 +70,8 @@ def discretisation(run_folder: Path, case: Case) -> Discretisation:
         return Discretisation(unknown=OFF)
     if ERRORS in case.pipeline.stages:
         return _estimated(run_folder / ERRORS.name / ESTIMATED)
+    if case.error_method == "estimate" and isinstance(case, StructureCase):
+        return _exact(run_folder)
     return _measured(run_folder, case)
 
 
@@ -72,11 +81,25 @@ def _estimated(path: Path) -> Discretisation:
         return Discretisation(unknown=NOT_RUN)
     figures = read_json(path)
     return Discretisation(
-        {name: error["discretisation"] for name, error in figures.items() if error["discretisation"] is not None},
+        _known(figures, "discretisation"),
         {name: error["how"] for name, error in figures.items()},
         "companions do not estimate it",
-        {name: error["order"] for name, error in figures.items() if error["order"] is not None},
+        _known(figures, "order"),
+        _known(figures, "two_scale"),
+        next((error["two_scale_how"] for error in figures.values() if error["two_scale_how"]), ""),
     )
+
+
+def _known(figures: Mapping[str, Mapping[str, Any]], key: str) -> dict[str, float]:
+    """Return a value of each figure that has one, by name."""
+    return {name: error[key] for name, error in figures.items() if error[key] is not None}
+
+
+def _exact(run_folder: Path) -> Discretisation:
+    """Return the errors of a structure against its exact solution, as the stage comparison has found them."""
+    metrics = (read_record(run_folder / "comparison") or {"metrics": {}})["metrics"]
+    errors = {name: abs(float(metrics[name]["value"])) for name in ERRORS_OF_EXACT if name in metrics}
+    return Discretisation(errors, dict.fromkeys(errors, EXACT), NOT_COMPARED)
 
 
 def _measured(run_folder: Path, case: Case) -> Discretisation:

@@ -1,99 +1,247 @@
-"""Stage that estimates the discretisation errors of a drop from its companions on two coarser meshes.
+"""Stage that estimates the errors of a run from its companions: discretisation, and two scales against one model.
 
-Each figure has an observed order and the grid convergence index of ``grid_convergence.py``. The figures of a joint are
-those of the critical joint of the run on all meshes. A failed companion leaves the errors unknown, with its message.
+Each figure has an observed order and the grid convergence index of ``grid_convergence.py``, in a drop at least the
+median of its family: the figures of the joint, or deflections and strains of the board. The error of two scales is
+the relative difference from one model on the same mesh, of the run or of the coarsest companion, or from half the
+coupling window. A failed companion leaves these errors unknown, with its message.
 """
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
+from statistics import median
 from typing import Any
 
-from reflowshock.fem.output.ranking import joint_figures
-from reflowshock.workflow.board_drop.companions import SIZES
-from reflowshock.workflow.board_drop.shock_launch import MODES
+from reflowshock.units import from_si
 from reflowshock.workflow.case.run import Findings, Run, metric
+from reflowshock.workflow.convergence.drop_companions import LEAST_END
+from reflowshock.workflow.convergence.figures import divergent_figures, reading_distances
 from reflowshock.workflow.convergence.grid_convergence import grid_convergence
-from reflowshock.workflow.package.case import BoardDropCase
-from reflowshock.workflow.process.products import write_json
-from reflowshock.workflow.store.companions import FAILED, companion_folder
+from reflowshock.workflow.process.products import read_json, write_json
+from reflowshock.workflow.store.companions import (
+    COARSEST,
+    FAILED,
+    HALF_WINDOW,
+    SIZES,
+    UNTIL,
+    companion_folder,
+    companion_title,
+    size_name,
+)
 from reflowshock.workflow.store.product import read_record
 
 FILE = "errors.json"
-BOARD = ("peak_board_strain", "peak_board_displacement")
-AT_POINTS = ("peak_acceleration@", "peak_displacement@", "peak_strain@", "peak_strain_rate@")
-NOT_CONVERGENT = {"peak_element_stress": "grows with refinement"}
+MODELS = ("two_scale", "explicit", "implicit", "dns")  # folders of results in a shock, the first model first
+ONE_MODEL = MODELS[-1]
+ROUNDING = 1e-6  # of the ends of two models
+
+Figures = Callable[[Path, Path, float | None], Mapping[str, float]]
+Sizes = Callable[[Any, Path], Mapping[str, float]]
 
 
 @dataclass(frozen=True, slots=True)
 class FigureError:
-    """Error of a figure, as in ``summary.json``.
+    """Error of a figure.
 
     Attributes:
         discretisation: Grid convergence index relative to the figure; None if unknown.
         order: Observed order; None without one.
-        how: Origin of the error, or why it is unknown.
+        two_scale: Relative error of two scales; None for one model, or if unknown.
+        how: Origin of the discretisation error, or why it is unknown.
+        two_scale_how: Origin of the error of two scales, or why it is unknown; empty for one model.
     """
 
     discretisation: float | None
     order: float | None
+    two_scale: float | None
     how: str
+    two_scale_how: str
 
 
-def estimate_errors(run: Run[BoardDropCase], folder: Path) -> Findings:
-    """Write ``errors.json``: the errors of the figures of a shock, and the cost of its companions."""
-    shocks = {size: companion_folder(run.folder, size) / "shock" for size in SIZES}
-    records = {size: read_record(shock) for size, shock in shocks.items()}
-    main = read_record(run.folder / "shock") or {"metrics": {}, "core_seconds": 0.0}
-    failed = [_failure(run.folder, size) for size in SIZES if records[size] is None]
-    joint = main["metrics"].get("critical_joint", {"value": ""})["value"]
-    values = [figures(shocks[size], joint) for size in sorted(SIZES, reverse=True)] if not failed else []
-    errors = {
-        name: _error(value, [coarse.get(name) for coarse in values], failed)
-        for name, value in figures(run.folder / "shock", joint).items()
-    }
-    errors |= {name: FigureError(None, None, why) for name, why in NOT_CONVERGENT.items() if name in main["metrics"]}
-    write_json(folder / FILE, {name: asdict(error) for name, error in errors.items()})
-    spent = sum(record["core_seconds"] for record in records.values() if record is not None)
-    share = {"companion_cost_share": metric(spent / main["core_seconds"])} if main["core_seconds"] else {}
-    return Findings(metrics=share)
+@dataclass(frozen=True, slots=True)
+class TwoScales:
+    """Errors of two scales of a run.
+
+    Attributes:
+        errors: Relative error of each figure.
+        how: Origin of the errors, or why they are unknown; empty for one model.
+    """
+
+    errors: Mapping[str, float] = field(default_factory=dict)
+    how: str = ""
 
 
-def figures(shock: Path, joint: str) -> dict[str, float]:
-    """Return the figures of a shock whose errors are estimated, by name of the metric.
+@dataclass(frozen=True, slots=True)
+class _Coarser:
+    """Companion on a coarser mesh.
+
+    Attributes:
+        size: Realised element size relative to the case.
+        figures: Figures by name; empty if it has no result.
+        failure: Why it has no result; empty if it has one.
+    """
+
+    size: float
+    figures: Mapping[str, float] = field(default_factory=dict)
+    failure: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """Reading of the figures of a kind of case.
+
+    Attributes:
+        figures: Function from the folder of a model, that of the first model of the run, and an end [s] or None, to the
+            figures by name.
+        sizes: Function from the case and its shock to the realised element size of each companion.
+        family: Function from the name of a figure to its family in words, empty without a family.
+    """
+
+    figures: Figures
+    sizes: Sizes
+    family: Callable[[str], str] = lambda _name: ""
+
+
+def estimate_errors(reading: Reading, run: Run[Any], folder: Path) -> Findings:
+    """Write ``errors.json``: the errors of the figures of a shock; return the cost of its companions.
 
     Args:
-        shock: Product of the shock.
-        joint: Joint of the section forces and stresses; empty without joints.
+        reading: Figures of the kind of case.
+        run: Run folder with the shock and its companions.
+        folder: Folder of the product.
     """
-    import numpy as np
-
-    record: Mapping[str, Any] = read_record(shock) or {"metrics": {}}
-    chosen = {
-        name: float(item["value"])
-        for name, item in record["metrics"].items()
-        if name in BOARD or name.startswith(AT_POINTS)
+    main = first_model(run.folder / UNTIL)
+    figures, realised = reading.figures, reading.sizes(run.case, run.folder / UNTIL)
+    names = [size_name(size) for size in sorted(SIZES, reverse=True)]
+    coarser = [_coarser(figures, run.folder, name, realised[name], main) for name in names]
+    two_scales = _two_scales(figures, run.folder, main)
+    errors = {name: _error(name, value, coarser, two_scales) for name, value in figures(main, main, None).items()}
+    errors = _with_families(errors, reading.family)
+    errors = _with_distances(errors, reading_distances(run.case, main)) | {
+        name: FigureError(None, None, None, "grows with refinement", "") for name in divergent_figures(main)
     }
-    if not joint:
-        return chosen
-    with np.load(next(path for mode in MODES if (path := shock / mode / "history.npz").is_file())) as arrays:
-        number = list(arrays["joints"]).index(joint)
-        return {name: value for name, (value, _) in joint_figures(arrays, number).items()} | chosen
+    write_json(folder / FILE, {name: asdict(error) for name, error in errors.items()})
+    return Findings(metrics=_cost_share(run.folder))
 
 
-def _error(value: float, coarser: list[float | None], failed: list[str]) -> FigureError:
-    """Return the error of a figure from its values on the coarser meshes, the coarsest first."""
-    if failed:
-        return FigureError(None, None, "; ".join(failed))
-    numbers = [number for number in coarser if number is not None]
-    if len(numbers) < len(coarser) or not value:
-        return FigureError(None, None, "zero, or not in all runs")
-    found = grid_convergence([*sorted(SIZES, reverse=True), 1.0], [*numbers, value])
-    return FigureError(found.index / abs(value), found.order, found.how)
+def first_model(shock: Path) -> Path:
+    """Return the folder of the results of the first model of a shock."""
+    return next(folder for model in MODELS if (folder := shock / model).is_dir())
 
 
-def _failure(run_folder: Path, size: float) -> str:
-    """Return why a companion has no result."""
-    path = companion_folder(run_folder, size) / FAILED
+def _coarser(figures: Figures, run_folder: Path, name: str, size: float, main: Path) -> _Coarser:
+    """Return a companion of a realised size with its figures, or with the reason why they are missing."""
+    if failure := _failure(run_folder, name):
+        return _Coarser(size, failure=failure)
+    return _Coarser(size, figures(first_model(companion_folder(run_folder, name) / UNTIL), main, None))
+
+
+def _error(name: str, value: float, coarser: list[_Coarser], two_scales: TwoScales) -> FigureError:
+    """Return the errors of a figure from its values on the coarser meshes, the coarsest first."""
+    scheme = two_scales.errors.get(name)
+    if why := _unknown(name, value, coarser):
+        return FigureError(None, None, scheme, why, two_scales.how)
+    sizes, values = [mesh.size for mesh in coarser], [mesh.figures[name] for mesh in coarser]
+    found = grid_convergence([*sizes, 1.0], [*values, value])
+    return FigureError(found.index / abs(value), found.order, scheme, found.how, two_scales.how)
+
+
+def _with_families(errors: Mapping[str, FigureError], family: Callable[[str], str]) -> dict[str, FigureError]:
+    """Return errors of at least the median of their family.
+
+    A figure that happens to change little between three meshes is not more accurate than the others of its mesh.
+    """
+    members: dict[str, list[float]] = {}
+    for name, error in errors.items():
+        if family(name) and error.discretisation is not None:
+            members.setdefault(family(name), []).append(error.discretisation)
+    medians = {name: median(values) for name, values in members.items()}
+
+    def raised(name: str, error: FigureError) -> FigureError:
+        least = medians.get(family(name), 0.0)
+        if error.discretisation is None or error.discretisation >= least:
+            return error
+        return replace(error, discretisation=least, how=f"median of the figures of {family(name)}; alone {error.how}")
+
+    return {name: raised(name, error) for name, error in errors.items()}
+
+
+def _with_distances(errors: Mapping[str, FigureError], distances: Mapping[str, float]) -> dict[str, FigureError]:
+    """Return the errors with a remark on each figure that is read away from its watch point, at a distance [m]."""
+    remarks = {name: f"; read {from_si(distance, 'mm', 2)} from the point" for name, distance in distances.items()}
+    return {
+        name: replace(error, how=error.how + remarks.get(name.partition("@")[2], "")) for name, error in errors.items()
+    }
+
+
+def _unknown(name: str, value: float, coarser: list[_Coarser]) -> str:
+    """Return why the discretisation error of a figure cannot be estimated; empty if it can."""
+    if failures := [mesh.failure for mesh in coarser if mesh.failure]:
+        return "; ".join(failures)
+    if not value or any(name not in mesh.figures for mesh in coarser):
+        return "zero, or not in all runs"
+    sizes = [mesh.size for mesh in coarser]
+    if not sizes[0] > sizes[1] > 1.0:
+        return f"rounded numbers of elements give meshes of {sizes[1]:.3g} and {sizes[0]:.3g} times the size"
+    return ""
+
+
+def _two_scales(figures: Figures, run_folder: Path, main: Path) -> TwoScales:
+    """Return the errors of two scales of a run: relative differences from another computation of the same mesh."""
+    if not _has_two_scales(main):
+        return TwoScales()
+    compared = _compared(run_folder, main)
+    if isinstance(compared, str):
+        return TwoScales(how=compared)
+    ours, reference, how = compared
+    end = _end(reference) if _end(reference) < (1.0 - ROUNDING) * _end(ours) else None
+    expected = figures(reference, main, end)
+    values = figures(ours, main, end)
+    errors = {name: abs(value / expected[name] - 1.0) for name, value in values.items() if expected.get(name)}
+    return TwoScales(errors, how if end is None else f"{how}, until {1e3 * end:.3g} ms")
+
+
+def _compared(run_folder: Path, main: Path) -> tuple[Path, Path, str] | str:
+    """Return two results of the same mesh that differ by their scales, and the difference in words; or why not."""
+    if (one := main.parent / ONE_MODEL).is_dir() and _end(one) >= LEAST_END * _end(main):
+        return main, one, "one model on the same mesh"
+    if failed := _failure(run_folder, COARSEST):
+        return failed
+    coarsest = first_model(companion_folder(run_folder, COARSEST) / UNTIL)
+    if (one := coarsest.parent / ONE_MODEL).is_dir():
+        return coarsest, one, f"one model, {companion_title(COARSEST)}"
+    if failed := _failure(run_folder, HALF_WINDOW):
+        return failed
+    halved = first_model(companion_folder(run_folder, HALF_WINDOW) / UNTIL)
+    return coarsest, halved, f"change by half the window, {companion_title(COARSEST)}"
+
+
+def _has_two_scales(results: Path) -> bool:
+    """Return whether results are those of two coupled models."""
+    return "scheme" in read_json(results / "result.json").get("coupling", {})
+
+
+def _end(results: Path) -> float:
+    """Return the end of a run [s]."""
+    model = read_json(results / "result.json")["model"]
+    end: float = model["window"] * model["windows"]
+    return end
+
+
+def _failure(run_folder: Path, name: str) -> str:
+    """Return why a companion has no result; empty if it has one."""
+    folder = companion_folder(run_folder, name)
+    if read_record(folder / UNTIL) is not None:
+        return ""
+    path = folder / FAILED
     why = path.read_text(encoding="utf-8").strip() if path.is_file() else "has not run"
-    return f"the run with elements x {size:g}: {why}"
+    return f"the run with {companion_title(name)}: {why}"
+
+
+def _cost_share(run_folder: Path) -> dict[str, Any]:
+    """Return the processor time of all companions over that of the shock of the run, as a metric."""
+    main = read_record(run_folder / UNTIL) or {"core_seconds": 0.0}
+    names = (*map(size_name, SIZES), HALF_WINDOW)
+    records = (read_record(companion_folder(run_folder, name) / UNTIL) for name in names)
+    spent = sum(record["core_seconds"] for record in records if record is not None)
+    return {"companion_cost_share": metric(spent / main["core_seconds"])} if main["core_seconds"] else {}

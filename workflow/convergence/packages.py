@@ -8,7 +8,7 @@ from typing import Any
 
 from reflowshock.meshing.board.pads import pad_table
 from reflowshock.units import from_si
-from reflowshock.workflow.board_drop.companions import rounded_count
+from reflowshock.workflow.board_drop.coarser_case import rounded_count
 from reflowshock.workflow.board_drop.duration import longest_duration
 from reflowshock.workflow.board_drop.shock_forecast import implicit_seconds
 from reflowshock.workflow.board_drop.shock_launch import MODES

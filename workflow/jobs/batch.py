@@ -12,7 +12,7 @@ from reflowshock.workflow.jobs.engine import SNAKEMAKE_LOG, JobOutput, failures_
 from reflowshock.workflow.jobs.executor import Executor, Jobs, Local, Slurm
 from reflowshock.workflow.pipeline.companions import companion_points
 from reflowshock.workflow.process.terminal import console
-from reflowshock.workflow.store.companions import UNTIL, companion_name, link_companions
+from reflowshock.workflow.store.companions import FOLDER, UNTIL, link_companions
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.product import discard
 from reflowshock.workflow.store.state import StageState, examine, why_stale
@@ -156,8 +156,8 @@ def _jobs(point: Point, stages: Sequence[str], *, is_of_companion: bool = False)
 def show_products(store: Store, point: Point) -> list[str]:
     """Link all intact, current products of a point and its companions into its run folder; return restored files."""
     companions = {
-        companion_name(size): (companion, _current(store, companion))
-        for size, companion in companion_points(store, point).items()
+        f"{FOLDER}/{name}": (companion, _current(store, companion))
+        for name, companion in companion_points(store, point).items()
     }
     return show(store, point, _current(store, point), companions)
 

@@ -9,32 +9,39 @@ from reflowshock.workflow.store.companions import UNTIL
 from reflowshock.workflow.store.point import Point
 from reflowshock.workflow.store.store import Store
 
-OWN = ("geometry", "solder_mesh", UNTIL)  # stages of a companion that depend on its meshes; it shares the others
 
-
-def companion_points(store: Store, point: Point) -> dict[float, Point]:
-    """Return the companions of a point by element size; none before its shock is complete, which decides them."""
+def companion_points(store: Store, point: Point) -> dict[str, Point]:
+    """Return the companions of a point by name; none before its shock is complete, which decides them."""
     names = point.case.pipeline.names
     if UNTIL not in names or store.record(point, UNTIL) is None:
         return {}
     copies = kind_of(point.case).companions(point.case, store.product(point, UNTIL))
-    return {size: Point({}, case) for size, case in copies.items()}
+    return {name: Point({}, case) for name, case in copies.items()}
 
 
-def companion_seconds(store: Store, point: Point) -> dict[float, float]:
+def companion_seconds(store: Store, point: Point) -> dict[str, float]:
     """Predict the wall time of each missing companion on one core [s]; empty if the case has none."""
     points = companion_points(store, point)
     if not points:
         expected = kind_of(point.case).companions(point.case, None)
-        return {size: _seconds(case, OWN) for size, case in expected.items()}
-    missing = {size: [stage for stage in OWN if not store.has(one, stage)] for size, one in points.items()}
-    return {size: _seconds(points[size].case, stages) for size, stages in missing.items() if stages}
+        return {name: _seconds(case, _own_stages(Point({}, case), point)) for name, case in expected.items()}
+    missing = {
+        name: [stage for stage in _own_stages(companion, point) if not store.has(companion, stage)]
+        for name, companion in points.items()
+    }
+    return {name: _seconds(points[name].case, stages) for name, stages in missing.items() if stages}
 
 
 def at_once(seconds: Iterable[float]) -> float:
     """Return the wall time of companions that run at once, one core each [s]."""
     times = list(seconds)
     return max(max(times, default=0.0), sum(times) / available_cores())
+
+
+def _own_stages(companion: Point, point: Point) -> list[str]:
+    """Return the stages of a companion whose products it does not share with its point."""
+    stages = (stage.name for stage in companion.case.pipeline.upstream(UNTIL))
+    return [stage for stage in stages if companion.digests[stage] != point.digests[stage]]
 
 
 def _seconds(case: Case, stages: Iterable[str]) -> float:

@@ -20,12 +20,16 @@ class Discretisation:
         how: Origin of each error, or why it is unknown, in words.
         unknown: Reason why other errors are unknown, or how to obtain them.
         orders: Observed order of each metric that has one.
+        two_scale: Relative error of two scales of each metric that has one.
+        two_scale_how: Origin of the errors of two scales, or why they are unknown; empty for one model.
     """
 
     errors: Mapping[str, float] = field(default_factory=dict)
     how: Mapping[str, str] = field(default_factory=dict)
     unknown: str = UNMEASURED
     orders: Mapping[str, float] = field(default_factory=dict)
+    two_scale: Mapping[str, float] = field(default_factory=dict)
+    two_scale_how: str = ""
 
     def text(self, name: str) -> str:
         """Return the error of a figure as text, or why it has none; empty if nothing is known of it."""
@@ -43,8 +47,8 @@ class Discretisation:
             name: {
                 "discretisation": self.errors.get(name),
                 "order": self.orders.get(name),
-                "two_scale": scheme_share(name, results),
-                "how": how,
+                "two_scale": self.two_scale.get(name, scheme_share(name, results)),
+                "how": f"{how}; two scales: {self.two_scale_how}" if self.two_scale_how else how,
             }
             for name, how in self.how.items()
         }

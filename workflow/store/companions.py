@@ -12,24 +12,36 @@ from reflowshock.workflow.store.store import Store
 FOLDER = "companions"  # in a run folder and in the work folder of the stage
 FAILED = "failed.txt"  # message of a companion without a result
 UNTIL = ERRORS.follows[-1]  # last stage of a companion
+SIZES = (1.5, 2.0)  # element sizes of companions relative to the case
+HALF_WINDOW = "half_window"  # companion with the largest elements and half the coupling window
 
-Companions = Mapping[float, Point]
-
-
-def companion_name(size: float) -> str:
-    """Return the name of the folder of a companion, from its element size relative to the case."""
-    return f"{FOLDER}/size_{size:g}"
+Companions = Mapping[str, Point]
 
 
-def companion_folder(run_folder: Path, size: float) -> Path:
+def size_name(size: float) -> str:
+    """Return the name of a companion from its element size relative to the case."""
+    return f"size_{size:g}"
+
+
+COARSEST = size_name(SIZES[-1])
+
+
+def companion_title(name: str) -> str:
+    """Return the difference of a companion from its case in words."""
+    if name == HALF_WINDOW:
+        return f"elements x {SIZES[-1]:g}, half the window"
+    return f"elements x {name.removeprefix(size_name(0.0)[:-1])}"
+
+
+def companion_folder(run_folder: Path, name: str) -> Path:
     """Return the folder with the products of a companion."""
-    return run_folder / companion_name(size)
+    return run_folder / FOLDER / name
 
 
 def link_companions(store: Store, work: Path, companions: Companions) -> None:
     """Link the results of companions into the work folder of the stage errors; write the message of each failure."""
-    for size, point in companions.items():
-        folder = companion_folder(work, size)
+    for name, point in companions.items():
+        folder = companion_folder(work, name)
         folder.mkdir(parents=True, exist_ok=True)
         discard(folder / UNTIL)
         if store.has(point, UNTIL):

@@ -8,35 +8,60 @@ from reflowshock.fem.problem.fittings import Fittings
 from reflowshock.fem.problem.structure import StructureProblem
 from reflowshock.meshing.board.box_plan import Box, BoxHoles, BoxLayer
 from reflowshock.workflow.case.case import Case
-from reflowshock.workflow.case.stage import Pipeline, Stage, report_of
+from reflowshock.workflow.case.error_settings import CaseNumerics, Method
+from reflowshock.workflow.case.stage import ERROR_METHOD, ERRORS, Pipeline, Stage, report_of
 from reflowshock.workflow.case.toml_file import resolved_path
 from reflowshock.workflow.structure.references import AnyReference
 
 MESH_KEYS = ("length", "width", "cells", "refine", "symmetry", "element", "layers", "holes")
 MOTION_KEYS = ("structure", "materials", *Fittings.model_fields, "loads", "dynamics")
-STRUCTURE = Pipeline(
-    (
-        Stage(
-            "geometry",
-            tuple(f"structure.{name}" for name in MESH_KEYS),
-            (),
-            ("geometry/structure.msh", "geometry/preview.png"),
-        ),
+
+
+def structure_pipeline(estimated: bool = False) -> Pipeline:
+    """Return the stages of a structure.
+
+    Args:
+        estimated: Whether companions on coarser meshes estimate the errors of the motion.
+    """
+    keys = tuple(f"structure.{name}" for name in MESH_KEYS)
+    stages = (
+        Stage("geometry", keys, (), ("geometry/structure.msh", "geometry/preview.png")),
         Stage("shock", MOTION_KEYS, ("geometry",), ()),
         Stage("comparison", ("references",), ("shock",), ("comparison/comparison.json",)),
-        report_of("geometry", "shock", "comparison"),
+        *((ERRORS,) if estimated else ()),
     )
-)
+    follows = tuple(stage.name for stage in stages)
+    return Pipeline((*stages, report_of(*follows, parameters=(ERROR_METHOD,))))
 
 
 class StructureCase(StructureProblem, Case):
     """Box of layers with supports, loads and references."""
 
     kind = "structure"
-    stages = STRUCTURE
     ranks_key = "dynamics.ranks"
 
     references: dict[str, AnyReference] = Field(default_factory=dict)
+    numerics: CaseNumerics = CaseNumerics()
+
+    @property
+    def pipeline(self) -> Pipeline:
+        """Stages of the structure, with the estimate of its errors if the case has one."""
+        return structure_pipeline(self.estimates_errors)
+
+    @property
+    def error_method(self) -> Method:
+        """Origin of the discretisation errors."""
+        return self.numerics.error.method
+
+    @property
+    def has_exact_solution(self) -> bool:
+        """Whether the motion is compared with an exact solution, so that its error is known."""
+        return any(reference.is_exact for reference in self.references.values())
+
+    @property
+    def estimates_errors(self) -> bool:
+        """Whether companions estimate the errors."""
+        return self.error_method == "estimate" and not self.has_exact_solution
 
     @classmethod
     def located(cls, table: dict, folder: Path) -> dict:

@@ -1,7 +1,7 @@
 """References for the motion of a structure: exact solutions, bounds, published values and records."""
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
@@ -11,9 +11,21 @@ from reflowshock.parameters import Parameters
 from reflowshock.problem import Problem, unknown_name
 from reflowshock.quantity import Quantity
 
+# Metrics of the stage comparison that are relative errors against an exact solution.
+ERRORS_OF_EXACT = (
+    "wave_speed_error",
+    "transmitted_velocity_error",
+    "reflected_velocity_error",
+    "wave_error",
+    "tip_deflection_error",
+    "swing_frequency_error",
+)
+
 
 class Reference(Parameters):
     """Base of all references: immutable, unknown keys are errors."""
+
+    is_exact: ClassVar[bool] = False  # whether it is the exact solution of the motion
 
     def problems(self, key: str, problem: StructureProblem) -> Iterator[Problem]:
         """Yield contradictions to the rest of the case.
@@ -42,6 +54,8 @@ class BarWave(Reference):
     in the upper layer.
     """
 
+    is_exact: ClassVar[bool] = True
+
     kind: Literal["bar_wave"] = "bar_wave"
     load: str
     incident: tuple[str, str]
@@ -63,6 +77,8 @@ class LayeredBar(Reference):
     one in the top layer.
     """
 
+    is_exact: ClassVar[bool] = True
+
     kind: Literal["layered_bar"] = "layered_bar"
     load: str
     incident: tuple[str, str]
@@ -78,6 +94,8 @@ class LayeredBar(Reference):
 
 class Cantilever(Reference):
     """Beam theory of a single-layer strip in plane strain, clamped at ``x_min``, under a sudden constant pressure."""
+
+    is_exact: ClassVar[bool] = True
 
     kind: Literal["cantilever"] = "cantilever"
     load: str
