@@ -46,11 +46,15 @@ class MeshEstimate:
 def decide_scheme(rules: Rules, steps: NDArray[np.float64], linear: bool, has_buffer: Callable[[], bool]) -> Choice:
     """Return the coupling scheme that the user sets or that the problem calls for, with the reason.
 
+    One-way coupling uses ``held_velocity``; a scheme set by the user stays; with "auto", linear models without springs
+    and with little stiffness-proportional damping use ``local_steps``, others the scheme of ``division.choose_scheme``.
+
     Args:
-        rules: Rules of the division.
+        rules: Settings of the division: coupling, supports and damping.
         steps: Critical steps of all cells, shape (ne,) [s].
         linear: Whether all forces are linear in the displacement.
-        has_buffer: Returns whether layers of board fit between the joints and the macro model.
+        has_buffer: Function without arguments that returns whether layers of board fit between the joints and the macro
+            model; called only for "auto".
 
     Raises:
         CouplingError: Local steps are set, and supports have springs.

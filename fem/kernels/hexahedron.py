@@ -135,11 +135,13 @@ def orthonormal_linear(weights, basis):
 def linear_divergence(weights, gradient, basis, result):
     """Compute the least-squares linear part of the shape-function gradients of a hexahedron (B-bar dilatation).
 
+    Each gradient component is a function of the position in the element; it is fitted by 1, xi, eta, zeta.
+
     Args:
         weights: Weights of the Gauss points, shape (8,) [m^3].
         gradient: Gradient of each shape function, Gauss point by node by direction, shape (8, 8, 3) [1/m].
-        basis: Workspace of shape (4, 8), overwritten by ``orthonormal_linear``.
-        result: Written: linear part of the gradients, shape (8, 8, 3) [1/m].
+        basis: Workspace of shape (4, 8), overwritten by the orthonormal linear functions at the Gauss points.
+        result: Written: linear part of the gradients in the order of ``gradient``, shape (8, 8, 3) [1/m].
     """
     orthonormal_linear(weights, basis)
     result[:] = 0.0

@@ -96,10 +96,10 @@ class OnePointBlocks(NamedTuple):
 
 @njit(**LANE_OPTIONS)
 def do_not_turn(w):
-    """Write the identity as rotation R of sixteen elements.
+    """Write the identity matrix as rotation R of sixteen elements (small kinematics).
 
     Args:
-        w: Flat workspace, shape (1312,); 144 entries are written at ``ROTATION``, entry k of element e at
+        w: Flat workspace, shape (1312,); nine entries (row by row) are written at ``ROTATION``, entry k of element e at
             ``16 * k + e``.
     """
     for lane in range(LANES):
@@ -140,11 +140,11 @@ def write_hourglass_energy(w, slip, energy):
 
 @njit(cache=True, error_model="numpy")
 def carried(strength, mises):
-    """Return the largest hourglass stress that a section carries next to its axial stress, a scalar [Pa].
+    """Return the largest hourglass stress that a section carries in addition to its axial stress, a scalar [Pa].
 
     Args:
         strength: Yield stress, positive scalar [Pa].
-        mises: Von Mises stress at the centre, scalar [Pa].
+        mises: Von Mises stress at the centre of the element, scalar [Pa].
     """
     return BENDING_STRENGTH * strength * max(LEAST_STRENGTH, 1.0 - (mises / strength) ** 2)
 

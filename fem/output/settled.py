@@ -39,7 +39,15 @@ def is_settled(history: Arrays, damped: bool = False) -> bool:
 
 
 def needed_end(history: Arrays) -> float | None:
-    """Return the time half an oscillation after the largest stress [s], None before the board first returns."""
+    """Return the time half an oscillation of the board after the largest joint stress [s], when a run may end early.
+
+    Args:
+        history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``board_centre``, shape (k, 3) [m], and stresses
+            of the joints at the ends ``board`` and ``package``, shape (k, joints) [Pa].
+
+    Returns:
+        Time [s]; None before the board has first returned to its position at the start, or without joints.
+    """
     time, half = history["time"], half_oscillation(history["time"], history["board_centre"][:, 2])
     if half is None or not PEEL.worse(history).size:
         return None
@@ -47,7 +55,15 @@ def needed_end(history: Arrays) -> float | None:
 
 
 def latest_swings(history: Arrays) -> float:
-    """Return the largest stress in the two latest swings over the largest of all; one if it is in them."""
+    """Return the largest joint stress in the two latest swings (half oscillations of the board) over its maximum.
+
+    Args:
+        history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``board_centre``, shape (k, 3) [m], and stresses
+            of the joints at the ends ``board`` and ``package``, shape (k, joints) [Pa].
+
+    Returns:
+        Ratio from 0 to 1, the largest over the measures of stress; 1 also before the board has first returned.
+    """
     time, half = history["time"], half_oscillation(history["time"], history["board_centre"][:, 2])
     if half is None:
         return 1.0

@@ -100,7 +100,10 @@ def kinematics_note(metrics: dict, kinematics: str) -> str:
 
 
 def ranking_mode(histories: dict, results: dict) -> str:
-    """Return the mode whose history ranks the joints: the one with all joints fine, unless it ended early.
+    """Return the mode whose history ranks the joints.
+
+    It is the DNS (one model with all joints fine) if the main run has coarse joints and the DNS lasted as long;
+    otherwise the main mode.
 
     Args:
         histories: Mode -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity, the

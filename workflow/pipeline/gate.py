@@ -92,7 +92,12 @@ def too_many_ranks(case: Case) -> Iterator[Problem]:
 
 
 def too_large(case: Case, leave: Leave | None = None) -> Iterator[Problem]:
-    """Yield a problem if a case needs more memory than this machine has (than any machine, if oversubscribed).
+    """Yield a problem if the predicted memory of a case exceeds the memory of this machine.
+
+    Args:
+        case: Case to check.
+        leave: Permissions of the user: implausible values (``force``) skip the check; more ranks than cores
+            (``oversubscribe``, for runs elsewhere) allow any memory that a machine can have. None grants neither.
 
     Yields:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.

@@ -143,7 +143,13 @@ def _interrupt(*_: object) -> NoReturn:
 
 @contextmanager
 def one_line_errors() -> Iterator[None]:
-    """Convert every exception of the block to an error message of one line and ``SystemExit``."""
+    """Convert every exception of a ``with`` block to an error message of one line, and end the process.
+
+    The exit code is the one that ``report_error`` returns: 2 for errors of the input, 1 for others.
+
+    Raises:
+        SystemExit: The block raised an exception or ``SystemExit``; without an error the program continues.
+    """
     try:
         yield
         _flush()

@@ -80,7 +80,7 @@ def read_mark(folder: Path) -> dict[str, str] | None:
 
 @contextmanager
 def lock_folder(folder: Path, what: str, name: str, force: bool = False) -> Iterator[int]:
-    """Create and mark a folder and hold its lock, which the system releases when this process ends.
+    """Create and mark a folder and hold its lock during a ``with`` block; the system releases it if the process ends.
 
     Args:
         folder: The folder.
