@@ -159,7 +159,7 @@ def mobility_without_table(motion: Loaded) -> NDArray[np.float64]:
             carry a large mass.
 
     Returns:
-        Inverse mass of each node and component, shape (n, 3) [1/kg]; not a copy if there is no large mass.
+        Inverse mass of each node and component, shape (n, 3) [1/kg]; not a copy if no node carries one.
     """
     if not len(motion.carried):
         return motion.mobility

@@ -123,7 +123,7 @@ def write_state(path: Path, header: Header, state: object) -> None:
 
 
 def digest_of(content: bytes) -> str:
-    """Return the hexadecimal SHA-256 digest of some bytes."""
+    """Return the SHA-256 digest of some bytes as hexadecimal text."""
     return hashlib.sha256(content).hexdigest()
 
 

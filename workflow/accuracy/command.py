@@ -275,7 +275,14 @@ def _failed(runner: StudyRunner) -> list[str]:
 
 
 def remark_unverified(accuracy: Accuracy) -> list[str]:
-    """Return one remark if the recommended settings were not run successfully, otherwise an empty list."""
+    """Return a remark if the recommended settings were not run, so that their error is predicted only.
+
+    Args:
+        accuracy: Convergence study with its recommendation.
+
+    Returns:
+        List with one sentence, which gives the reason; empty if they were run successfully.
+    """
     chosen = accuracy.recommended
     if chosen is None or tables.prediction(accuracy) is not None:
         return []

@@ -68,7 +68,11 @@ def read_toml(path: Path) -> dict:
 
 
 def is_too_deep(value: object) -> bool:
-    """Return whether tables and lists are nested deeper than ``DEEPEST``."""
+    """Return whether tables and lists are nested deeper than ``DEEPEST`` (16) levels.
+
+    Args:
+        value: Value of a parsed TOML file: table, list or plain value.
+    """
     level = [value]
     for _ in range(DEEPEST):
         level = [

@@ -97,9 +97,13 @@ BOARD_DROP = package_pipeline(heated=False, dropped=True)
 
 
 def joint_geometries(pads: "Sequence[PadSite]") -> "dict[str, JointGeometry]":
-    """Return the geometry (gap, radii, offset, tilt) of each joint of a pad table, by joint name.
+    """Return the geometry of each joint of a pad table, by joint name.
 
-    Lengths are in metres, angles in radians; radii are those that solder can wet.
+    Args:
+        pads: Pad table, one entry per joint.
+
+    Returns:
+        Name -> gap, offset and wettable radii [m], and tilt [rad] of the joint.
     """
     from reflowshock.particles.core.geometry import JointGeometry
 

@@ -67,7 +67,10 @@ def _values(case: Case, leave: Leave) -> list[Problem]:
 
 
 def unreadable_files(case: Case) -> Iterator[Problem]:
-    """Yield a problem for each input file that is missing, unreadable or too large.
+    """Yield a problem for each input file of a case that is missing, unreadable or too large.
+
+    Args:
+        case: Case with the paths of its files.
 
     Yields:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
@@ -80,6 +83,9 @@ def unreadable_files(case: Case) -> Iterator[Problem]:
 
 def too_many_ranks(case: Case) -> Iterator[Problem]:
     """Yield a problem for each key that requests more MPI ranks than this machine has cores.
+
+    Args:
+        case: Case with its numbers of ranks.
 
     Yields:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.

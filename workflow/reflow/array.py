@@ -143,6 +143,10 @@ def finish(job: CarriedReflow, _progress: Callable[[float], None]) -> "JointShap
 
     Args:
         job: Solder, and files of the joint after its first reflow and at the end, which are read.
+        _progress: Not used; functions of the pool take it.
+
+    Returns:
+        Particles, free surface, history and metrics of the joint at the end.
     """
     from reflowshock.particles.scenes.carried_joint import carried_shape
 

@@ -93,5 +93,9 @@ def late_peak(history: Arrays) -> str:
 
 
 def peaks_late(values: NDArray) -> bool:
-    """Return whether a history, shape (times,), is largest in the last fiftieth of the run."""
+    """Return whether a history is largest in the last fiftieth of the run, so that a longer run may exceed it.
+
+    Args:
+        values: Samples in time, shape (times,).
+    """
     return bool(np.argmax(values) >= len(values) - max(2, len(values) // 50))

@@ -23,16 +23,27 @@ class Change:
 
 
 def stage_inputs(case: Case, stage: Stage) -> dict:
-    """Return the inputs of a stage: dotted key -> SI value, and for input files ``<key>.sha256`` -> digest."""
+    """Return the inputs of a stage: its parameters and the digests of its input files.
+
+    Args:
+        case: Case with all parameters.
+        stage: Stage of the case's pipeline.
+
+    Returns:
+        Dotted key -> SI value, and for input files ``<key>.sha256`` -> digest.
+    """
     contents = [(f"{key}.sha256", _digest(path)) for key, path in case.files.items()]
     return {key: value for key, value in [*_flat(case.model_dump(mode="json")), *contents] if stage.depends_on(key)}
 
 
 def product_keys(case: Case) -> dict[str, str]:
-    """Return the product key of each stage; equal keys mean equal products.
+    """Return the product key of each stage of a case; equal keys mean equal products.
 
     A key is a digest of the parameters of the stage and of all upstream stages, and of the program version. The names
     of case and scale enter only the key of the report.
+
+    Args:
+        case: Case with all parameters; its input files are read.
 
     Returns:
         Name of each stage -> key, hexadecimal digits.

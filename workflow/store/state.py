@@ -31,9 +31,13 @@ class StageState:
 
 
 def examine(store: Store, point: Point) -> dict[str, StageState]:
-    """Return the state of each stage, in order, by checking every file of every product.
+    """Return the state of each stage, in order, by checking every file of every product; nothing is changed.
 
     An intact product stays valid when an upstream product is rebuilt with the same content.
+
+    Args:
+        store: Store of the products.
+        point: Case with its settings.
 
     Returns:
         Name of a stage -> whether it has to run, and why: missing, damaged files, changed parameters, upstream stages.

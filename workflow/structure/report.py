@@ -110,7 +110,11 @@ def add_two_scales(result: Mapping, context: dict) -> None:
 
 
 def meshed_part(case: StructureCase) -> str:
-    """Return the meshed part of the body: "half", "quarter", or empty for the whole body."""
+    """Return the part of the body that symmetry leaves to be meshed: "half", "quarter", or empty for the whole body.
+
+    Args:
+        case: Case of a structure with its symmetry planes.
+    """
     return ("", "half", "quarter")[len(set(case.structure.symmetry))]
 
 

@@ -203,9 +203,16 @@ def warn_of_metrics(points: Points, store: Store, first: Point) -> None:
 
 
 def has_metrics(study: Study, rows: Sequence[Row]) -> bool:
-    """Return whether the points have all metrics of a study, and print the missing ones.
+    """Check that the points of a study have all its metrics, and print the missing ones.
 
-    The ranking metric must be a number.
+    The metric by which points are ranked must be a number.
+
+    Args:
+        study: Study, which names its metrics.
+        rows: Results of the points.
+
+    Returns:
+        Whether every metric exists in at least one point, or no point has any metric.
     """
     available = _metrics_of(study, rows)
     unavailable = [name for name in study.metrics if available and name not in available]

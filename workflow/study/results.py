@@ -74,12 +74,15 @@ def row_of(number: int, store: Store, point: Point, keys: Sequence[str], failure
 
 
 def columns(rows: Sequence[Row], study: Study) -> dict[str, list[Value]]:
-    """Return the results by column; the name ends with the unit in brackets, metrics are in SI units.
+    """Return the results of a study by column, for its CSV and Parquet tables.
 
-    Columns on points have names that differ from all metrics, since metrics include ``verdict`` and ``seconds``.
+    Args:
+        rows: Results of the points.
+        study: Study with its varied keys.
 
     Returns:
-        Column title -> value of each row, None where it is missing.
+        Column title -> value of each row, None where it is missing. The columns are number and key of the point, varied
+        parameters, result, message, wall time, report, and metrics in SI units; titles end with the unit in brackets.
     """
     metrics = dict.fromkeys((name, metric["unit"]) for row in rows for name, metric in row.metrics.items())
     table: dict[str, list[Value]] = {"number": [row.number for row in rows], "point": [row.key for row in rows]}

@@ -90,7 +90,10 @@ class Study:
 
 
 def read_study(path: Path) -> Study:
-    """Read and check a study file, without its case.
+    """Read and check a study file (TOML), without its case.
+
+    Args:
+        path: Study file.
 
     Raises:
         CaseError: The file is invalid; the error lists all problems.

@@ -138,10 +138,13 @@ class BoardDeflection(Criterion):
 
 
 def seats(case: BoardDropCase) -> list[Seat]:
-    """Return the package, and the further packages that can be compared with the deflection below it.
+    """Return the components whose survival can be judged by the deflection of the board below the package.
 
-    Their factors r need the deflection of the board's centre, so they are compared only if the package is there, and
-    only between the holes.
+    These are the package and the further packages. Their position factors need the deflection of the board's centre, so
+    the others are compared only if the package is there, and only between the holes.
+
+    Args:
+        case: Case of a board drop.
 
     Returns:
         Name, sides along x and y [m] and position factor of each component, the package first.
