@@ -38,11 +38,14 @@ class PlannedStage:
 
 
 def planned_stages(store: Store, point: Point) -> dict[str, PlannedStage]:
-    """Return the planned action of each stage, by name in order: whether it runs, why, and its predicted time [s].
+    """Return the planned action of each stage of a run, in order; nothing is changed.
 
     Args:
         store: Store of the run folder, whose files are examined.
-        point: Point of the run.
+        point: Case with its settings, which determines the run.
+
+    Returns:
+        Name of a stage -> whether it runs, why, and its predicted time [s].
     """
     costs = predicted_costs(store, point.case, stage_seconds(point.case))
     return {

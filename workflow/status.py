@@ -121,7 +121,7 @@ def _add_row(table: Table, record: dict | None, title: str, stage: str, state: S
 
 
 def metric_text(metric: dict) -> str:
-    """Format a metric in a customary unit.
+    """Format the value of a metric in a customary unit, such as MPa for stresses.
 
     Args:
         metric: Record with ``value`` (SI) and ``unit``.

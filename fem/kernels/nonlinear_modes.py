@@ -36,8 +36,9 @@ def write_normals(w):
     """Write n_k, the gradients of the parent coordinates at the centres of sixteen hexahedra in the middle of the step.
 
     Args:
-        w: Flat workspace of ``ALL_SLOTS`` entries, entry k of element e at ``16 * k + e``; reads transformed positions
-            at ``MIDDLE`` [m], writes the three vectors n_1, n_2, n_3 at ``NORMAL``.
+        w: Flat workspace of ``ALL_SLOTS`` entries, entry k of element e at ``16 * k + e``; reads the transformed
+            positions (sums and differences over the corners) in the middle of the step at ``MIDDLE`` [m], writes the
+            three vectors n_1, n_2, n_3 at ``NORMAL``.
     """
     for lane in range(LANES):
         a, b, c = three(w, MIDDLE + X + lane), three(w, MIDDLE + Y + lane), three(w, MIDDLE + Z + lane)
@@ -54,12 +55,15 @@ def write_normals(w):
 def write_sums(values, w, at):
     """Write the sums of xi_k s, k = 1 to 3, over the Gauss points of sixteen hexahedra, for six scalars s per point.
 
+    xi_k are the parent coordinates of the Gauss points, from -1 to 1.
+
     Args:
         values: Stresses or strain increments of each Gauss point, entry i of element e in column ``16 * i + e``, shape
             (8, >= 96).
-        w: Flat workspace, of which 288 entries are written: the sum of entry i for xi_k of element e at
-            ``at + 16 * (6 (k - 1) + i) + e``.
-        at: Position of the first sum in ``w``, integer: ``BEFORE`` or ``AFTER`` for stresses, ``SUMS`` for strains.
+        w: Flat workspace, of which 288 entries are written: the sum of entry i for xi_k of element e at ``at + 16 * (6
+            (k - 1) + i) + e``.
+        at: Position of the first sum in ``w``, integer: ``BEFORE`` or ``AFTER`` for stresses before or after the step,
+            ``SUMS`` for strains.
     """
     for i in range(6 * LANES):
         a, b, c, d = values[0, i], values[1, i], values[2, i], values[3, i]

@@ -61,12 +61,15 @@ def write_edges(w, field, edges, start):
 
 @njit(**LANE_OPTIONS)
 def write_modes(forces, w):
-    """Write the forces on the transformed nodal values of sixteen hexahedra, the transpose of ``write_edges``.
+    """Compute the forces on the transformed nodal values of sixteen hexahedra, the transpose of ``write_edges``.
+
+    Transformed nodal values are sums and differences of the values at the eight corners.
 
     Args:
-        forces: Forces on the derivatives at each Gauss point: component c along direction d of element e in column
-            ``16 * (3 d + c) + e``, shape (8, 144), in the unit of the nodal forces.
-        w: Flat workspace; its first 384 entries are overwritten by the forces on the 24 transformed nodal values.
+        forces: Forces on the derivatives at each Gauss point: component c along direction d of element e in column ``16
+            * (3 d + c) + e``, shape (8, 144), in the unit of the nodal forces.
+        w: Flat workspace; its first 384 entries are overwritten by the forces on the 24 transformed nodal values, entry
+            k of element e at ``16 * k + e``.
     """
     for k in range(24 * LANES):
         w[k] = 0.0

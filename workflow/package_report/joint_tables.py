@@ -56,7 +56,8 @@ def shapes(joints: Sequence[Record]) -> dict:
         joints: Records of the joints, see ``joint_records``.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per shape.
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per shape: joints, and the measures
+        that exist, such as standoff, width, contact angles, tilt, axial force and volume drift.
     """
     return record_table(SHAPE_COLUMNS, by_shape(joints), lambda key, values: values[0])
 
@@ -68,7 +69,8 @@ def verdicts(run_folder: Path) -> dict:
         run_folder: Run folder, of which ``reflow/joints.json`` is read.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per joint.
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per joint: name, verdict, joints that
+        it touches, standoff and largest width [µm].
     """
     joints = read_json(run_folder / "reflow/joints.json")
     rows = [
@@ -100,7 +102,9 @@ def ranked_joints(
         fine: Names of the fine joints; None if all are fine.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per joint, the most stressed first.
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per joint, the most stressed first:
+        name, verdict, margin, peak stresses, plastic work if any, worse pad, time of the peak, section force and
+        moment, standoff and width.
     """
     shape = {joint["name"]: joint for joint in joints}
     measure = ranking_measure(history)
@@ -178,8 +182,9 @@ def meshes(joints: Sequence[Record]) -> dict | None:
         joints: Records of the joints, see ``joint_records``.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per shape; None before the joints are
-        meshed.
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per shape: meshing method, errors of
+        volume, standoff and contact area, smallest scaled Jacobian, critical time step and others that exist. None
+        before the joints are meshed.
     """
     if not any("minimum_scaled_jacobian" in joint for joint in joints):
         return None
@@ -193,7 +198,8 @@ def missed_tries(joints: Sequence[Record]) -> dict | None:
         joints: Records of the joints, see ``joint_records``; ``tries`` lists the failed attempts.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per attempt; None without failed ones.
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per failed attempt: joint, method and
+        unmet criterion; None without failed attempts.
     """
     rows = [
         [joint["name"], attempt["method"], attempt["missed"]] for joint in joints for attempt in joint.get("tries", ())

@@ -49,7 +49,8 @@ def table(real: Arrays, identical: Arrays, joints: Sequence[Mapping]) -> dict:
         joints: Records with ``name`` and ``standoff`` [m], see ``joint_records``.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per joint.
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per joint: name, both peaks [MPa],
+        relative change, standoff of the real joint [µm].
     """
     peaks, identical_peaks = peel_peaks(real), peel_peaks(identical)
     standoff = {joint["name"]: joint["standoff"] for joint in joints}

@@ -55,10 +55,10 @@ def product_keys(case: Case) -> dict[str, str]:
 
 
 def product_key(case: Case, stage: Stage, inputs: dict, follows: Sequence[str | None]) -> str:
-    """Return the key of a product.
+    """Return the key of a product, a digest of all its inputs: parameters, input files and upstream products.
 
     Args:
-        case: The case.
+        case: Case of the product; its name enters only the key of the report.
         stage: Stage that makes the product.
         inputs: Parameters of the stage, as returned by ``stage_inputs``.
         follows: Product keys of the stages that it follows, in order.

@@ -120,7 +120,7 @@ class Criterion(ABC):
 
 
 def worst(judgements: Iterable[Judgement]) -> Judgement | None:
-    """Return the judgement with the smallest margin (limit over value); None if none applies.
+    """Return the judgement with the smallest margin, the ratio of limit and value; None if no criterion applies.
 
     Args:
         judgements: Value and limit of each criterion; those that do not apply are skipped.
@@ -134,14 +134,14 @@ def value_text(value: float, unit: str) -> tuple[str, str]:
 
     Args:
         value: Value in SI units.
-        unit: SI unit; empty for ratios and strains.
+        unit: SI unit, "m/m" for strains; empty for ratios.
     """
     factor, display_unit = (1e6, "µm/m") if unit == "m/m" else SHOWN.get(unit, (1.0, unit))
     return f"{factor * value:.3g}", display_unit
 
 
 def margin_text(margin: float) -> str:
-    """Return a margin, the limit over the value, as text with two digits; below 1 the limit is violated."""
+    """Return a margin as text with two digits; it is a ratio of limit and value, and below 1 the limit is violated."""
     return f"{margin:.2g}" if margin < 99.5 else f"{margin:.0f}"
 
 
