@@ -56,6 +56,9 @@ def decide_scheme(rules: Rules, steps: NDArray[np.float64], linear: bool, has_bu
         has_buffer: Function without arguments that returns whether layers of board fit between the joints and the macro
             model; called only for "auto".
 
+    Returns:
+        Name of the scheme and the reason as text.
+
     Raises:
         CouplingError: Local steps are set, and supports have springs.
     """
@@ -124,6 +127,9 @@ def in_local_steps(
         plan: Windows; the substeps follow from the levels.
         most_levels: Largest number of levels below the window.
 
+    Returns:
+        Division with the step level of each cell, the ratios of steps between levels, and the windows.
+
     Raises:
         LevelError: The critical steps differ by more than the levels allow.
     """
@@ -142,6 +148,9 @@ def in_path_levels(division: Division, rules: Rules, limits: StepLimits, around:
         limits: Critical steps [s] and costs of all cells.
         around: Function that takes a mask of cells and returns the mask of the meso cells that share a node with them,
             also through ties, shape (ne,) each.
+
+    Returns:
+        Division with the same cells and windows; levels of the meso cells, ratios between levels and substeps are new.
     """
     return with_path_levels(division, limits, around, rules.coupling.most_levels)
 
@@ -155,6 +164,9 @@ def divide_estimate(estimate: MeshEstimate, rules: Rules) -> Division:
     Args:
         estimate: Parts of the mesh.
         rules: Rules of the division, whose masks have shape (n,).
+
+    Returns:
+        Division: scheme with its reason, masks of the rows in each model, level of each row, windows and substeps.
 
     Raises:
         CouplingError: Local steps are set, and supports have springs.

@@ -145,6 +145,9 @@ def choose_scheme(elastic: bool, buffer_possible: bool) -> Choice:
     Args:
         elastic: Whether the whole meso model is linear elastic at small strains.
         buffer_possible: Whether two layers of board fit between fine cells and the macro model.
+
+    Returns:
+        Name of the scheme and the reason as text.
     """
     if elastic:
         return Choice("local_steps", "all elements with small steps are linear elastic at small strains")

@@ -35,6 +35,9 @@ def with_path_levels(division: Division, limits: StepLimits, around: Around, mos
         around: Function that takes a mask of cells and returns the mask of the meso cells that share a node with them,
             also through ties, shape (ne,) each.
         most: Largest number of levels.
+
+    Returns:
+        Division with the same cells and windows; levels of the meso cells, ratios between levels and substeps are new.
     """
     plan, finer = division.plan, FinerCells(division.meso, limits, around)
 

@@ -80,6 +80,9 @@ def settling_measures(history: Arrays) -> tuple[Measure, ...]:
     Args:
         history: Arrays of ``history.npz``: ``peel_<end>`` [Pa] and, with plasticity, ``plastic_work_<end>`` for the
             ends ``board`` and ``package``, each of shape (times, joints).
+
+    Returns:
+        Measures whose methods return histories and peaks on the worse pad from such arrays.
     """
     return (PEEL,) if ranking_measure(history) is PLASTIC_WORK else (PEEL, VON_MISES)
 

@@ -106,6 +106,9 @@ def thermal_tables(mesh: MeshData, centre: NDArray[np.float64]) -> ThermalTables
         mesh: Mesh of board and package.
         centre: Centre of the package's rotations, shape (3,) [m].
 
+    Returns:
+        Tables with fixed components and pins, mask of the package's nodes, and free rigid-body motions of both bodies.
+
     Raises:
         MeshError: Board or package is missing, or they share nodes.
     """

@@ -351,5 +351,8 @@ def table(texts: dict, title: str) -> Table:
     Args:
         texts: Table with ``head`` (column titles) and ``rows`` (lists of text).
         title: Title of the table.
+
+    Returns:
+        Table of rich with the same columns and rows.
     """
     return text_table(f"\n{title}" if title else "", texts["head"], texts["rows"], remarks=texts.get("prose", False))

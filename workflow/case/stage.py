@@ -82,6 +82,9 @@ def report_of(*follows: str, parameters: tuple[str, ...] = ()) -> Stage:
     Args:
         follows: Names of the stages whose products it reads.
         parameters: Dotted keys that its verdicts depend on.
+
+    Returns:
+        Stage that writes the report page and ``summary.json``.
     """
     pages = tuple(f"report/{name}" for name in PAGE)
     return Stage("report", ("case", "scale", *parameters), follows, pages, on_top=PAGE)

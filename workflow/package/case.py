@@ -67,6 +67,9 @@ def package_pipeline(heated: bool, dropped: bool, estimated: bool = False) -> Pi
         heated: Whether the reflow has temperatures, and so needs the mesh of board and package.
         dropped: Whether the case has a shock.
         estimated: Whether companions on coarser meshes estimate the errors of the shock.
+
+    Returns:
+        Stages in the order in which they run, each with its inputs and products.
     """
     geometry = Stage(
         "geometry", DRAWN_MESH, (), ("geometry/assembly.msh", "geometry/pads.json", "geometry/preview.png")

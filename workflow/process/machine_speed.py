@@ -51,7 +51,12 @@ class MachineSpeed:
 
 
 def machine_speed() -> MachineSpeed | None:
-    """Return the measured slowness of this machine; None before the first measurement or if its file is damaged."""
+    """Return the measured slowness of this machine; None before the first measurement or if its file is damaged.
+
+    Returns:
+        Mean slowness (time of an element update over the time of the reference machine), slowness of each element
+        family, day of the measurement, and number of cores that other programs used.
+    """
     folder = kernel_folder()
     with suppress(OSError, ValueError, TypeError):
         if folder is not None:

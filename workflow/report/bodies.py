@@ -29,6 +29,9 @@ def body_group(
         chosen: Mask of the selected cells, shape (c,).
         values: Cell values of each field, shape (k, c); a vertex gets the mean over its faces.
         style: Further attributes of ``Group``, such as ``colour``.
+
+    Returns:
+        Vertices, faces, displacements and values of the fields at the k times, as one group of a scene.
     """
     faces, cell = boundary(series.cells[chosen])
     part = series.fields["part"][0][chosen].astype(np.int64)[cell]

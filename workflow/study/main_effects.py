@@ -117,6 +117,9 @@ def rank_parameters(rows: Sequence[Row], metric: str, goal: str) -> list[Row]:
         rows: Results of the points.
         metric: Name of the metric.
         goal: "minimise" or "maximise"; rows with failed checks are left out.
+
+    Returns:
+        The rows, ordered by the metric.
     """
     from reflowshock.workflow.study.results import HEALTHY
 

@@ -78,6 +78,9 @@ def main_effects(effects: Sequence[tuple[str, str, Sequence[MainEffect]]]) -> Fi
 
     Args:
         effects: Metric, its unit and its main effects; each item is a row of panels.
+
+    Returns:
+        Figure of Matplotlib with one row of panels per metric and one panel per factor.
     """
     columns = max(len(row) for _, _, row in effects)
     with pyplot.rc_context(STYLE):

@@ -55,6 +55,9 @@ def row_of(number: int, store: Store, point: Point, keys: Sequence[str], failure
         point: Point.
         keys: Varied keys.
         failure: Message of its failure; None if the point is complete.
+
+    Returns:
+        Number, key, varied settings, verdict ("healthy", "unhealthy", "failed"), message, wall time [s] and metrics.
     """
     texts = display_values(point.case)
     settings = {key: texts.get(key, point.settings[key]) for key in keys}

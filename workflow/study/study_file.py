@@ -95,6 +95,9 @@ def read_study(path: Path) -> Study:
     Args:
         path: Study file.
 
+    Returns:
+        Study with its case file, design (factors and settings of each point), metrics and goal.
+
     Raises:
         CaseError: The file is invalid; the error lists all problems.
     """
