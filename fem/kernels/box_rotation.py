@@ -233,10 +233,10 @@ def turn_higher(w):
 
 @njit(cache=True)
 def replace_by_forces(k, w):
-    """Replace the modes [m] of sixteen boxes by the forces on them [N]; ``k (480,)`` from ``spread_shape``.
+    """Replace the modes [m] of sixteen boxes by the forces on them [N]; ``k (480,)``: constants by ``spread_shape``.
 
-    ``w (672,)``: mode p of box e at ``16 (3 p + c) + e``, F at ``384 + 16 i + e``, R at ``528 + 16 i + e``.
-    The loops are short and unrolled: otherwise the compiler does not vectorise them, which triples the time.
+    ``w (672,)``: mode p of box e, then its force, at ``16 (3 p + c) + e``; reads rotation R at ``528 + 16 i + e`` and F
+    at ``384 + 16 i + e`` (overwritten). The loops are short and unrolled: only then does the compiler vectorise them.
     """
     resist(k, w)
     write_stress(k, w)

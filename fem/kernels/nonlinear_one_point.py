@@ -96,10 +96,10 @@ class OnePointBlocks(NamedTuple):
 
 @njit(**LANE_OPTIONS)
 def do_not_turn(w):
-    """Write the identity matrix as rotation R of sixteen elements (small kinematics).
+    """Write the identity as rotation R of sixteen elements.
 
     Args:
-        w: Flat workspace, shape (1312,); nine entries (row by row) are written at ``ROTATION``, entry k of element e at
+        w: Flat workspace, shape (1312,); 144 entries are written at ``ROTATION``, entry k of element e at
             ``16 * k + e``.
     """
     for lane in range(LANES):
@@ -140,21 +140,18 @@ def write_hourglass_energy(w, slip, energy):
 
 @njit(cache=True, error_model="numpy")
 def carried(strength, mises):
-    """Return the largest hourglass stress that a section carries in addition to its axial stress, a scalar [Pa].
+    """Return the largest hourglass stress that a section carries next to its axial stress, a scalar [Pa].
 
     Args:
         strength: Yield stress, positive scalar [Pa].
-        mises: Von Mises stress at the centre of the element, scalar [Pa].
+        mises: Von Mises stress at the centre, scalar [Pa].
     """
     return BENDING_STRENGTH * strength * max(LEAST_STRENGTH, 1.0 - (mises / strength) ** 2)
 
 
 @njit(**LANE_OPTIONS)
 def may_slip(w, energy, weight, first, young):
-    """Return how many of sixteen elements exceed the hourglass limit of the first yield stress, as a float.
-
-    Without any, ``hourglass_flow`` has nothing to do. The limit is the stress that a section carries in addition to its
-    axial stress.
+    """Return how many of sixteen elements exceed the hourglass limit at the first yield stress, as a float.
 
     Args:
         w: Flat workspace; reads the von Mises stresses [Pa] of the sixteen centres at ``DEFORMATION + MISES``.
@@ -176,16 +173,14 @@ def may_slip(w, energy, weight, first, young):
 def hourglass_flow(blocks, b, before, w):
     """Reduce the hourglass forces of a block of sixteen elements to the limit of a section; the excess becomes slip.
 
-    The limit is the stress that the section carries in addition to its axial stress before it yields. Plastic work is
-    the slip times the mean force of the step, without the rotation of the force within it.
+    Plastic work is the slip times the mean force of the step, without the rotation of the force within it.
 
     Args:
         blocks: ``OnePointBlocks``; hourglass energy, slip and plastic work of the block are updated.
         b: Number of the block, integer.
         before: Hourglass energy before the step, shape (16,) [J].
-        w: Flat workspace, entry k of element e at ``16 * k + e``, with twelve amplitudes at ``A`` [m], the von Mises
-            stress of the centre at ``DEFORMATION + MISES`` [Pa], and twelve hourglass forces at ``A + SHIFT`` [N],
-            which are reduced.
+        w: Flat workspace with twelve amplitudes at ``A`` [m], the von Mises stress of the centre at ``DEFORMATION +
+            MISES`` [Pa], and twelve hourglass forces at ``A + SHIFT`` [N], which are reduced.
     """
     law, young = blocks.plastic[blocks.material[b]], blocks.modulus[blocks.material[b]]
     state, weight, slip = blocks.state[b, 0], blocks.weight[blocks.pattern[b], 0], blocks.slip[b]
@@ -206,11 +201,10 @@ def hourglass_flow(blocks, b, before, w):
 
 @njit(**LANE_OPTIONS)
 def write_nominal_small(w, state, weight):
-    """Replace the displacement gradients of sixteen elements by the stress times the volume, for small kinematics.
+    """Replace F of sixteen elements by the stress times the volume, for small kinematics.
 
     Args:
-        w: Flat workspace; nine entries (row by row), entry k of element e at ``16 * k + e``, are written at
-            ``DEFORMATION`` [J].
+        w: Flat workspace, written at ``DEFORMATION`` [J], entry k (row by row) of element e at ``16 * k + e``.
         state: Flat state of the centres in the same order, shape (208,); reads the six stresses [Pa] at ``STRESS``.
         weight: Volume, shape (16,) [m^3].
     """
@@ -221,14 +215,11 @@ def write_nominal_small(w, state, weight):
 
 @njit(**LANE_OPTIONS)
 def write_nominal_finite(w, state, weight):
-    """Replace the deformation gradients F of sixteen elements by P, the nominal stress times volume.
-
-    P is the derivative of the energy by F; it includes the moment of the hourglass forces about the centre.
+    """Replace F of sixteen elements by P, the nominal stress times volume (derivative of the energy by F).
 
     Args:
-        w: Flat workspace, entry k of element e at ``16 * k + e``; reads the rotation R at ``ROTATION``, twelve
-            hourglass amplitudes g^ at ``A`` [m] and hourglass forces at ``A + SHIFT`` [N]; P is written at
-            ``DEFORMATION`` [J], row by row.
+        w: Flat workspace, entry k of element e at ``16 * k + e``; reads R at ``ROTATION``, twelve amplitudes g^ at
+            ``A`` [m] and hourglass forces at ``A + SHIFT`` [N]; P is written at ``DEFORMATION`` [J], row by row.
         state: Flat state of the centres in the same order, shape (208,); reads six stresses [Pa] at ``STRESS`` and six
             entries of the stretch U at ``STRETCH``.
         weight: Initial volume, shape (16,) [m^3].
@@ -251,13 +242,11 @@ def move_centre(blocks, b, path, w):
     """Advance the stress at the centres of a block of sixteen elements by a step.
 
     Args:
-        blocks: ``OnePointBlocks``; state (stress, plastic strain, strain or stretch) and plastic work of the block are
-            updated.
+        blocks: ``OnePointBlocks``; state and plastic work of the block are updated.
         b: Number of the block, integer.
         path: ``Path``: small or finite kinematics, and the time step of rate-dependent laws [s].
-        w: Flat workspace, entry k of element e at ``16 * k + e``; reads the deformation gradient F (finite) or the
-            displacement gradient (small) at ``DEFORMATION``, nine entries row by row; writes the rotation R at
-            ``ROTATION`` (finite) and the von Mises stress at ``DEFORMATION + MISES`` [Pa].
+        w: Flat workspace; reads F (finite) or the displacement gradient (small) at ``DEFORMATION``, nine entries;
+            writes R at ``ROTATION`` (finite) and the von Mises stress at ``DEFORMATION + MISES`` [Pa].
 
     Returns:
         Whether no element is turned inside out; otherwise the state is unchanged.
@@ -286,10 +275,8 @@ def move_hourglass(blocks, b, unit, before, w):
         b: Number of the block, integer.
         unit: 1.0 for finite kinematics (the workspace has F), 0.0 for small ones (it has F - 1), a scalar.
         before: Workspace of shape (16,), overwritten by the hourglass energies before the step [J].
-        w: Flat workspace, entry k of element e at ``16 * k + e``; reads the transformed displacements (sums and
-            differences over the corners) in its first 384 entries [m], the deformation gradient F or F - 1 at
-            ``DEFORMATION`` and the rotation R at ``ROTATION``; twelve amplitudes (three components of the modes xy, xz,
-            yz, xyz) are written at ``A`` [m], twelve forces at ``A + SHIFT`` [N].
+        w: Flat workspace; reads transformed displacements [m], F or F - 1 at ``DEFORMATION`` and R at ``ROTATION``;
+            twelve amplitudes [m] are written at ``A``, twelve forces [N] at ``A + SHIFT``.
     """
     k, energy, slip = blocks.constants[blocks.pattern[b]], blocks.hourglass_energy[b], blocks.slip[b]
     weight, material = blocks.weight[blocks.pattern[b], 0], blocks.material[b]

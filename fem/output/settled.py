@@ -24,13 +24,16 @@ SMALL = 0.1  # fraction of the largest deflection below which a zero crossing do
 def is_settled(history: Arrays, damped: bool = False) -> bool:
     """Return whether the largest stress of all joints has passed, and enough swings of the board after it.
 
-    Then a run may end early. Half an oscillation, a swing, is the time from the start to the first zero crossing of the
-    board centre. It is at least half the period of the first mode, since it includes the pulse.
+    Then a run may end early: half an oscillation after the largest stress, and, if the board is damped, when stresses
+    in the two latest swings are at most 0.9 times the largest. A swing, half an oscillation, is the time from the start
+    to the first zero crossing of the board centre. It is at least half the period of the first mode, since it includes
+    the pulse.
 
     Args:
-        history: Arrays named in ``WATCHED``: ``time``, shape (k,) [s], ``board_centre``, shape (k, 3) [m], and for the
-            ends ``board`` and ``package`` the stresses, shape (k, joints) [Pa], and plastic work of the joints.
-        damped: Whether the board is damped; then the two latest swings must have decayed.
+        history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``board_centre``, shape (k, 3) [m], and for the
+            ends ``board`` and ``package`` the stresses, shape (k, joints) [Pa], and plastic work of the joints if
+            solder may yield.
+        damped: Whether the board is damped.
     """
     end = needed_end(history)
     if end is None or history["time"][-1] < end:

@@ -105,9 +105,13 @@ def alternatives(field: FieldInfo) -> tuple[FieldInfo, ...]:
 
 
 def allowed(field: FieldInfo) -> str:
-    """Describe the allowed values of a field as text: names, or a range in the user's unit; empty without a limit.
+    """Describe the allowed values of a field as text, for messages: names, or a range in the user's unit.
 
-    A quantity without bounds gives ``any`` and its kind.
+    Args:
+        field: Field of a parameter model (pydantic).
+
+    Returns:
+        Text; ``any`` and the kind of quantity without bounds, and empty for other fields without a limit.
     """
     kinds = alternatives(field)
     if len(kinds) > 1:

@@ -114,10 +114,13 @@ def _describe_known(error: BaseException, where: Path | None) -> str:
 
 
 def describe_text(text: str) -> str:
-    """Return a plain description of a library message about exhausted resources, or an empty string.
+    """Return a plain description of a library message about exhausted resources, such as memory or disk space.
 
     Args:
         text: Message of a library.
+
+    Returns:
+        Sentence; empty if the message is about something else.
     """
     return next((words for pattern, words in LIBRARY_ERRORS if pattern.search(text)), "")
 
@@ -188,6 +191,9 @@ def report_error(error: BaseException) -> int:
 
     Errors of the input have a line for each problem, the exit code 2 and no traceback. An interrupt and all other
     errors have the exit code 1, unless the error has an ``exit_code``. A closed pipe is not reported.
+
+    Args:
+        error: Exception that ends the program.
     """
     if is_interrupt(error):
         _print_error("interrupted")

@@ -114,11 +114,11 @@ def forecast_coupled(case: StructureCase, layers: Mapping[str, LayerForecast], u
 
 
 def critical_step(case: StructureCase, layers: Mapping[str, LayerForecast]) -> float:
-    """Return the predicted critical time step of the explicit scheme with damping, over all elements [s].
+    """Predict the critical time step of the explicit scheme with damping, the smallest of all layers [s].
 
     Args:
-        case: Case of a structure.
-        layers: Size and critical step of each layer by name; mass-scaled layers are left out.
+        case: Case of a structure, with its damping and mass scaling.
+        layers: Number of elements and critical step of each layer by name; mass-scaled layers are left out.
     """
     from reflowshock.fem.estimates.estimate import damped_critical_step
 

@@ -166,8 +166,8 @@ def results(points: Points, store: Store, failed: dict[str, str]) -> list[Row]:
 
     Args:
         points: Points of the study, possible and impossible ones.
-        store: Store of the products.
-        failed: Key of a point -> reason of its failure.
+        store: Store of the products, from which summaries are read.
+        failed: Key of a point (name of its run folder) -> reason of its failure.
 
     Returns:
         Number, key, settings, verdict, message, wall time [s] and metrics of each point.
