@@ -130,11 +130,11 @@ def gradient_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float6
 
 
 def one_point_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64], finite: bool) -> OnePointBlocks:
-    """Return stress-free one-point hexahedra in blocks of sixteen, the arguments of ``nonlinear_one_point`` kernels.
+    """Return stress-free one-point hexahedra in blocks of sixteen, the arguments of the nonlinear kernels.
 
     Args:
         elements: Hexahedra of the one-point formulation.
-        lanes: Their order, from ``arrange``: element of each lane of each block, and the shapes that blocks share.
+        lanes: Their order, from ``arrange``.
         plastic: 3 G, A, B [Pa], n, C and reference rate [1/s] of each material (Johnson and Cook), shape (nm, 6).
         finite: Whether kinematics are finite (the state then holds stretches) instead of small.
     """

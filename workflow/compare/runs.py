@@ -50,7 +50,10 @@ class ComparedRun:
 
 
 def read_runs(folders: Sequence[Path]) -> list[ComparedRun]:
-    """Read two or more run folders.
+    """Read two or more run folders; nothing is written.
+
+    Args:
+        folders: Run folders of the same kind of case.
 
     Returns:
         Name, resolved case, summary and history arrays of each run, in the order of the folders.

@@ -23,7 +23,11 @@ FIELDS = (
 
 
 def show_registry(console: Console) -> None:
-    """Print a table of all effects of the program for each stage: term, number, influence, switch, implementation."""
+    """Print a table of all effects of the program for each stage: term, number, influence, switch, implementation.
+
+    Args:
+        console: Console to print to.
+    """
     for stage in dict.fromkeys(effect.stage for effect in registry().values()):
         table = new_table(f"\nEffects of the {stage}", "effect", "", "description")
         for effect in registry().values():

@@ -65,14 +65,13 @@ class Face:
 
 
 def faces(structure: Mapping[str, NDArray]) -> tuple[Face, Face]:
-    """Return the underside of the package and the top face of the board below it.
+    """Return the underside of the package and the top face of the board below it, with their lifts at solidification.
 
     Args:
-        structure: Arrays of ``reflow/structure.npz`` (``points``, ``displacement``, ``package``, ``temperature``,
-            ``pad_motion``, …).
+        structure: Arrays of ``reflow/structure.npz``, see ``read_structure``.
 
     Returns:
-        Both faces with their nodes, shape (n, 3), and lifts, shape (n,) [m].
+        Both faces with their nodes, shape (n, 3), and lifts along z, shape (n,) [m].
     """
     points, displacement, package = (structure[name] for name in ("points", "displacement", "package"))
     under = package & (points[:, 2] <= points[package, 2].min() + SAME_HEIGHT)
@@ -116,11 +115,11 @@ def warpage_scene(structure: Mapping[str, NDArray], joints: Sequence[Mapping[str
 
 
 def profiles(structure: Mapping[str, NDArray]) -> list[Chart]:
-    """Return charts of the lift along the package diagonal, and of the joint gaps over temperature.
+    """Return two charts: lift of board and package along the package diagonal, and joint gaps over temperature.
 
     Args:
-        structure: Arrays of ``reflow/structure.npz`` (``points``, ``displacement``, ``package``, ``temperature``,
-            ``pad_motion``, …).
+        structure: Arrays of ``reflow/structure.npz``, see ``read_structure``: nodes, displacements, temperatures and
+            pad motions of all load steps.
 
     Returns:
         Interactive charts for the report page.
@@ -146,15 +145,14 @@ def profiles(structure: Mapping[str, NDArray]) -> list[Chart]:
 
 
 def load_steps(structure: Mapping[str, NDArray]) -> dict:
-    """Return the table of load steps: temperature, corner motion, gaps, iterations, residuals.
+    """Return the table of load steps of a coupled reflow.
 
     Args:
-        structure: Arrays of ``reflow/structure.npz`` (``points``, ``displacement``, ``package``, ``temperature``,
-            ``pad_motion``, …).
+        structure: Arrays of ``reflow/structure.npz``, see ``read_structure``.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per load step; quantities
-        that are zero throughout have no column.
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per load step: temperature, corner
+        motion, changes of gaps, coupling iterations and residuals; quantities that are zero throughout have no column.
     """
     columns = [
         ("temperature [°C]", structure["temperature"] - KELVIN, ".1f"),

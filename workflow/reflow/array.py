@@ -56,7 +56,10 @@ class CarriedReflow:
 
 
 def records() -> tuple[type, ...]:
-    """Return the dataclasses that the files of jobs and results of this module's functions may contain, for reading."""
+    """Return the dataclasses that may occur in the files of jobs and results of ``carry`` and ``finish``.
+
+    Only these types are created when such a file is read by another process.
+    """
     from reflowshock.particles.core.geometry import JointGeometry
     from reflowshock.particles.scenes.carried_joint import Carried
     from reflowshock.particles.steps.shape import JointShape, Snapshot

@@ -70,7 +70,7 @@ def exaggeration(length: float, deflection: float) -> float:
 
 
 def round_down(factor: float) -> float:
-    """Round down to 1, 2 or 5 times a power of ten."""
+    """Round a positive number down to 1, 2 or 5 times a power of ten."""
     power = 10.0 ** np.floor(np.log10(factor))
     return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= factor))
 

@@ -95,11 +95,12 @@ def placement(coupling: Record) -> dict | None:
 
 
 def oracle(seconds: float, results: Sequence[Record]) -> str:
-    """Return sentences that compare the cost of the two-scale run with one implicit model.
+    """Return sentences that compare the processor time of a two-scale run with one model with implicit steps.
 
     Args:
         seconds: Predicted time of the implicit run on one rank [s].
-        results: Contents of ``result.json`` of the two-scale run and, if there was one, of the preceding coarse run.
+        results: Contents of ``result.json`` of the two-scale run and, if there was one, of the preceding coarse run;
+            ``timings`` and ``model`` are read.
     """
     core_seconds = sum(result["timings"]["windows"] * result["model"]["ranks"] for result in results)
     runs = "the two-scale run" if len(results) == 1 else "the two-scale run and the preceding coarse run"

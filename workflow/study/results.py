@@ -47,13 +47,13 @@ class Row:
 
 
 def row_of(number: int, store: Store, point: Point, keys: Sequence[str], failure: str | None) -> Row:
-    """Return the row of a point.
+    """Return the row of a point, from the summary of its run or from the message of its failure.
 
     Args:
-        number: Number of the point in the study.
-        store: Store of its products.
-        point: Point.
-        keys: Varied keys.
+        number: Number of the point in the study, from 1.
+        store: Store of its products, from which ``summary.json`` is read.
+        point: Case with its settings.
+        keys: Dotted keys that the study varies.
         failure: Message of its failure; None if the point is complete.
 
     Returns:
