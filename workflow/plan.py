@@ -59,7 +59,7 @@ def plan_record(store: Store, point: Point) -> dict[str, Any]:
 
     Args:
         store: Store of the run folder, whose files are examined.
-        point: Point of the run.
+        point: Case of the run with its settings.
 
     Returns:
         ``case`` (name), ``folder``, ``stages`` (``runs``, ``why``, ``seconds`` by name), ``effects``, ``companions``
@@ -85,7 +85,7 @@ def show_plan(store: Store, point: Point, console: Console) -> None:
 
     Args:
         store: Store of the run folder, whose files are examined; nothing is changed.
-        point: Point of the run.
+        point: Case of the run with its settings.
         console: Console to print to.
     """
     case = point.case
@@ -147,7 +147,7 @@ def predicted_seconds(store: Store, point: Point, until: str) -> float:
 
     Args:
         store: Store of the run folder, whose files are examined.
-        point: Point of the run.
+        point: Case of the run with its settings.
         until: Last stage to run.
     """
     states, costs = examine(store, point), predicted_costs(store, point.case, stage_seconds(point.case))

@@ -188,7 +188,7 @@ def verify(store: Store, point: Point) -> bool:
 
     Args:
         store: Store of the run folder; nothing is changed.
-        point: Point of the run.
+        point: Case of the run with its settings.
 
     Returns:
         Whether all products and all files of the run folder are present and unmodified.

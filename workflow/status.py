@@ -50,7 +50,7 @@ def follow_run(store: Store, point: Point, console: Console) -> None:
 
     Args:
         store: Store of the run folder, in which another process runs.
-        point: Point of the run.
+        point: Case of the run with its settings.
         console: Console to print to.
     """
     if not is_busy(store.folder):
@@ -90,7 +90,7 @@ def show_status(store: Store, point: Point, console: Console) -> None:
 
     Args:
         store: Store of the run folder, whose files are checked.
-        point: Point of the run.
+        point: Case of the run with its settings.
         console: Console to print to.
     """
     table = Table(title=f"{point.case.case.name} in {store.folder}", title_justify="left", expand=True)

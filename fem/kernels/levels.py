@@ -184,7 +184,7 @@ def add_forces(arrays, displacement, force):
 
 @njit(cache=True)
 def take_steps(motion, forces, interface, accelerations, step):
-    """Take m steps of central differences as ``ExplicitMotion.advance`` and ``update_force`` do.
+    """Take m steps of central differences, v += dt (f / m + g) and u += dt v, with the forces of a model, in one call.
 
     Args:
         motion: ``StepArrays`` (state, masses and tie of this rank), updated.

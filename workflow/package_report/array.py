@@ -33,7 +33,7 @@ def shapes_scene(run_folder: Path, joints: Sequence[Mapping[str, Any]]) -> Scene
 
     Args:
         run_folder: Folder of the run; without closed surfaces the shapes of the reflow are shown.
-        joints: Records of the joints, see ``joint_records``.
+        joints: Records of the joints with ``name``, ``shape`` and measures in SI units, see ``joint_records``.
 
     Returns:
         Interactive 3D scene for the report page.

@@ -53,7 +53,7 @@ def shapes(joints: Sequence[Record]) -> dict:
     """Return the table of distinct joint shapes, by increasing standoff.
 
     Args:
-        joints: Records of the joints, see ``joint_records``.
+        joints: Records of the joints with ``name``, ``shape`` and measures in SI units, see ``joint_records``.
 
     Returns:
         Table with ``head`` (column titles) and ``rows`` (lists of text), one row per shape: joints, and the measures
@@ -97,7 +97,7 @@ def ranked_joints(
     Args:
         history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity
             with one column per joint.
-        joints: Records of the joints, see ``joint_records``.
+        joints: Records of the joints with ``name``, ``shape`` and measures in SI units, see ``joint_records``.
         judged: Name of a joint -> record with ``verdict``, ``margin`` (None without a limit) and ``criterion``.
         fine: Names of the fine joints; None if all are fine.
 
@@ -179,7 +179,7 @@ def meshes(joints: Sequence[Record]) -> dict | None:
     """Return the table of mesh quality, the worst of each shape; None before the joints are meshed.
 
     Args:
-        joints: Records of the joints, see ``joint_records``.
+        joints: Records of the joints with ``name``, ``shape`` and measures in SI units, see ``joint_records``.
 
     Returns:
         Table with ``head`` (column titles) and ``rows`` (lists of text), one row per shape: meshing method, errors of
@@ -195,7 +195,8 @@ def missed_tries(joints: Sequence[Record]) -> dict | None:
     """Return the table of failed meshing attempts; None if every first attempt succeeded.
 
     Args:
-        joints: Records of the joints, see ``joint_records``; ``tries`` lists the failed attempts.
+        joints: Records of the joints with ``name``, ``shape`` and measures in SI units, see ``joint_records``;
+            ``tries`` lists the failed attempts.
 
     Returns:
         Table with ``head`` (column titles) and ``rows`` (lists of text), one row per failed attempt: joint, method and

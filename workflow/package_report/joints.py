@@ -46,7 +46,8 @@ def headline(joints: Sequence[Mapping[str, Any]]) -> list[dict]:
     """Return the figures of the joints at the top of the page: range of standoffs, numbers of joints and of shapes.
 
     Args:
-        joints: Records of the joints, see ``joint_records``; at least one.
+        joints: Records of the joints with ``name``, ``shape`` and measures in SI units, see ``joint_records``; at least
+            one.
 
     Returns:
         Two records with ``value`` and ``label`` as text.

@@ -84,8 +84,9 @@ def warpage_scene(structure: Mapping[str, NDArray], joints: Sequence[Mapping[str
     """Return both faces with their lift relative to the centre, and the positions of the joints between them.
 
     Args:
-        structure: Arrays of ``reflow/structure.npz`` (``points``, ``displacement``, ``package``, ``temperature``,
-            ``pad_motion``, …).
+        structure: Arrays of ``reflow/structure.npz``: nodes ``points`` and ``displacement``, shape (n, 3) [m],
+            ``package`` (mask), ``temperature``, shape (steps,) [K], ``pad_motion``, shape (steps, joints, 2, 6) [m,
+            rad], and residuals per step.
         joints: Records with ``x``, ``y`` [m] and, optionally, ``name``.
 
     Returns:
@@ -174,8 +175,9 @@ def in_words(structure: Mapping[str, NDArray]) -> str:
     """Return a sentence on the warpage of package and board and the change of the gaps at solidification.
 
     Args:
-        structure: Arrays of ``reflow/structure.npz`` (``points``, ``displacement``, ``package``, ``temperature``,
-            ``pad_motion``, …).
+        structure: Arrays of ``reflow/structure.npz``: nodes ``points`` and ``displacement``, shape (n, 3) [m],
+            ``package`` (mask), ``temperature``, shape (steps,) [K], ``pad_motion``, shape (steps, joints, 2, 6) [m,
+            rad], and residuals per step.
     """
     package, board = faces(structure)
     gaps = relative_lift(structure)[-1] / MICRO
@@ -191,8 +193,9 @@ def relative_lift(structure: Mapping[str, NDArray]) -> Floats:
     """Return the change of the gap of each joint: lift of its package pad minus lift of its board pad.
 
     Args:
-        structure: Arrays of ``reflow/structure.npz`` (``points``, ``displacement``, ``package``, ``temperature``,
-            ``pad_motion``, …); ``pad_motion`` has shape (steps, joints, 2, 6), board pad first.
+        structure: Arrays of ``reflow/structure.npz``: nodes ``points`` and ``displacement``, shape (n, 3) [m],
+            ``package`` (mask), ``temperature``, shape (steps,) [K], ``pad_motion``, shape (steps, joints, 2, 6) [m,
+            rad], and residuals per step; ``pad_motion`` has shape (steps, joints, 2, 6), board pad first.
 
     Returns:
         Change of the gap from the drawing, shape (steps, joints) [m].

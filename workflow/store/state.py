@@ -36,7 +36,7 @@ def examine(store: Store, point: Point) -> dict[str, StageState]:
     An intact product stays valid when an upstream product is rebuilt with the same content.
 
     Args:
-        store: Store of the products.
+        store: Store: the folder of all products of a run or study.
         point: Case with its settings.
 
     Returns:
@@ -100,7 +100,7 @@ def failed_checks(store: Store, point: Point, until: str) -> list[str]:
     """List the failed health checks of stages as messages; a stage without a record counts as failed.
 
     Args:
-        store: Store of the products.
+        store: Store: the folder of all products of a run or study.
         point: Point to check.
         until: Last stage to check.
     """

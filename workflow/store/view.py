@@ -34,7 +34,7 @@ def show(store: Store, point: Point, stages: Iterable[str], companions: Companio
     """Link the products of some stages of a point into its run folder and remove all other links.
 
     Args:
-        store: Store of the products.
+        store: Store: the folder of all products of a run or study.
         point: Point of the run folder.
         stages: Stages whose products exist and are intact.
         companions: Folder in the run folder -> companion and its intact stages.
@@ -98,7 +98,7 @@ def shown_records(store: Store, point: Point) -> dict[str, dict]:
     """Return the records of the products that a run folder shows.
 
     Args:
-        store: Store of the products.
+        store: Store: the folder of all products of a run or study.
         point: Case with its settings, which determines the run folder.
 
     Returns:

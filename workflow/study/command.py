@@ -119,7 +119,7 @@ def run_study(points: Points, store: Store, machine: Machine, *, force: bool = F
 
     Args:
         points: Points of the study.
-        store: Store of the products.
+        store: Store: the folder of all products of a run or study.
         machine: Resources for the computation.
         force: Whether the folder may hold another study.
 
@@ -186,7 +186,7 @@ def warn_of_metrics(points: Points, store: Store, first: Point) -> None:
 
     Args:
         points: Points with their study, whose metrics are named in its file.
-        store: Store of the products.
+        store: Store: the folder of all products of a run or study.
         first: The first complete point.
     """
     show_products(store, first)
