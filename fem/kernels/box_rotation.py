@@ -48,7 +48,7 @@ def read_modes(faces, start, w):
 
     Args:
         faces: Component c of face parity k at node i at ``(4 c + k) WIDTH + FIRST + i``, shape (12 WIDTH,) [m].
-        start: First of the sixteen boxes in the row.
+        start: Number of the first of the sixteen boxes in the row, integer.
         w: Workspace (672,); writes component c of mode p (bit d: odd along d) of box e to ``16 (3 p + c) + e`` [m].
     """
     for k in range(4):
@@ -67,8 +67,8 @@ def add_faces(w, start, count, faces):
 
     Args:
         w: Workspace (672,); force on component c of mode p (bit d: odd along d) of box e at ``16 (3 p + c) + e`` [N].
-        start: First of the sixteen boxes in the row.
-        count: Number of these boxes that are added; the others repeat the last box of the row.
+        start: Number of the first of the sixteen boxes in the row, integer.
+        count: Number of these boxes that are added, integer; the others repeat the last box of the row.
         faces: Component c of face parity k at node i at ``(4 c + k) WIDTH + FIRST + i``, (12 WIDTH,) [N], added to.
     """
     for k in range(4):

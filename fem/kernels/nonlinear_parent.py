@@ -29,7 +29,7 @@ def places(g):
     There, each derivative is a vector of three components for sixteen elements, 48 consecutive entries.
 
     Args:
-        g: Number of the Gauss point, 0 to 7; bits 0, 1 and 2 are its sides along x, y and z.
+        g: Number of the Gauss point, integer 0 to 7; bits 0, 1 and 2 are its sides along x, y and z.
 
     Returns:
         Positions of the first component of the first element, for derivatives along x, y and z, three integers.

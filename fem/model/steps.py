@@ -136,11 +136,14 @@ def assembled_step(
 
 
 def find_minimum(world: MPI.Comm, values: Sequence[NDArray[np.float64]]) -> float:
-    """Return the smallest of all values of all arrays on all ranks, infinity if there are none; collective.
+    """Return the smallest of all values of all arrays on all ranks, in their unit, such as critical steps; collective.
 
     Args:
         world: Communicator of all ranks that take part.
         values: Arrays of this rank, of any shape; at least one, which may be empty.
+
+    Returns:
+        Minimum, equal on all ranks; infinity if all arrays of all ranks are empty.
     """
     return float(world.allreduce(min(float(array.min(initial=np.inf)) for array in values), MPI.MIN))
 

@@ -182,7 +182,7 @@ def box_around(points: list[Point]) -> tuple[Point, Point]:
 
 
 def round_diameter(shape: str, width: float, height: float) -> float:
-    """Return the diameter of the circle with the area of a shape.
+    """Return the diameter of the circle that has the area of a pad or hole, in the unit of its sides.
 
     Args:
         shape: "circle", "oval", or anything else for a rectangle.

@@ -68,7 +68,8 @@ def faces(structure: Mapping[str, NDArray]) -> tuple[Face, Face]:
     """Return the underside of the package and the top face of the board below it, with their lifts at solidification.
 
     Args:
-        structure: Arrays of ``reflow/structure.npz``, see ``read_structure``.
+        structure: Arrays of ``reflow/structure.npz``: nodes ``points`` and ``displacement``, shape (n, 3) [m], and
+            ``package``, mask of its nodes, shape (n,).
 
     Returns:
         Both faces with their nodes, shape (n, 3), and lifts along z, shape (n,) [m].
@@ -119,8 +120,9 @@ def profiles(structure: Mapping[str, NDArray]) -> list[Chart]:
     """Return two charts: lift of board and package along the package diagonal, and joint gaps over temperature.
 
     Args:
-        structure: Arrays of ``reflow/structure.npz``, see ``read_structure``: nodes, displacements, temperatures and
-            pad motions of all load steps.
+        structure: Arrays of ``reflow/structure.npz``: nodes ``points`` and ``displacement``, shape (n, 3) [m],
+            ``package`` (mask), ``temperature``, shape (steps,) [K], and ``pad_motion``, shape (steps, joints, 2, 6) [m,
+            rad].
 
     Returns:
         Interactive charts for the report page.
@@ -149,7 +151,9 @@ def load_steps(structure: Mapping[str, NDArray]) -> dict:
     """Return the table of load steps of a coupled reflow.
 
     Args:
-        structure: Arrays of ``reflow/structure.npz``, see ``read_structure``.
+        structure: Arrays of ``reflow/structure.npz``, one row per load step: ``temperature`` [K],
+            ``corner_displacement`` [m], ``pad_motion`` (steps, joints, 2, 6) [m, rad], ``iterations``,
+            ``force_residual`` and ``rigid_residual``.
 
     Returns:
         Table with ``head`` (column titles) and ``rows`` (lists of text), one row per load step: temperature, corner

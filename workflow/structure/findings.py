@@ -127,10 +127,14 @@ def cost_ratio(folders: Mapping[str, Path]) -> dict:
 
 
 def read_history(folder: Path) -> dict[str, NDArray]:
-    """Return the arrays of a solver's ``history.npz`` by name, such as ``time`` and ``displacement@<watch point>``.
+    """Return the arrays that a solver wrote to ``history.npz``.
 
     Args:
         folder: Folder of the solver.
+
+    Returns:
+        Name -> array: ``time``, shape (k,) [s], and k rows of each quantity, such as ``displacement@<watch point>``,
+        shape (k, 3) [m].
     """
     with np.load(folder / "history.npz") as arrays:
         return dict(arrays)
