@@ -61,7 +61,7 @@ def move(state, mobility, nodes, kicks, steps):
 
 @njit(cache=True)
 def kicks_of(accelerations, step, kicks):
-    """Compute the contributions of a body force to several steps at once, for ``move``.
+    """Compute what a body force adds to velocity and displacement in several steps taken at once, for ``move``.
 
     Args:
         accelerations: Body acceleration as each step begins, shape (k, 3) [m/s^2].

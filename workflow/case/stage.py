@@ -77,14 +77,11 @@ ERRORS = Stage("errors", (ERROR_METHOD,), (SHOCK,), ("errors/errors.json",))
 
 
 def report_of(*follows: str, parameters: tuple[str, ...] = ()) -> Stage:
-    """Return the report stage of a pipeline.
+    """Return the stage of a pipeline that writes ``report.html`` and ``summary.json``.
 
     Args:
         follows: Names of the stages whose products it reads.
         parameters: Dotted keys that its verdicts depend on.
-
-    Returns:
-        Stage that writes the report page and ``summary.json``.
     """
     pages = tuple(f"report/{name}" for name in PAGE)
     return Stage("report", ("case", "scale", *parameters), follows, pages, on_top=PAGE)

@@ -23,7 +23,7 @@ LINES = ("solid", "dashed", "dotted")
 
 
 def show(runs: Sequence[ComparedRun], console: Console) -> None:
-    """Print the parameters and the first results in which two or more runs differ, or that all are equal.
+    """Print the parameters and the most important results in which two or more runs differ, or that all are equal.
 
     Args:
         runs: Two or more runs; the first one is the reference of the changes.

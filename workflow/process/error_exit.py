@@ -65,7 +65,11 @@ _run_folder: dict[str, Path] = {}  # "folder": run folder of this process, if it
 
 
 def set_run_folder(folder: Path) -> None:
-    """Set the run folder of this process, into whose logs ``report_error`` writes tracebacks."""
+    """Set the run folder of this process, into whose logs ``report_error`` writes tracebacks from now on.
+
+    Args:
+        folder: Run folder.
+    """
     _run_folder["folder"] = folder
 
 

@@ -71,7 +71,14 @@ def product_key(case: Case, stage: Stage, inputs: dict, follows: Sequence[str | 
 
 
 def inputs_digest(case: Case) -> str:
-    """Return the SHA-256, hexadecimal, of all parameters and input files of a case that its stages depend on."""
+    """Return one digest of all parameters and input files of a case that its stages depend on.
+
+    Args:
+        case: Case with all parameters; its input files are read.
+
+    Returns:
+        SHA-256 as hexadecimal text.
+    """
     return digest_of({stage.name: stage_inputs(case, stage) for stage in case.pipeline.stages})
 
 

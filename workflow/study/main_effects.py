@@ -111,15 +111,12 @@ def effect_of(factor: Factor, rows: Sequence[Row], metric: str) -> MainEffect:
 
 
 def rank_parameters(rows: Sequence[Row], metric: str, goal: str) -> list[Row]:
-    """Return the healthy rows in which a metric is a number, the best first.
+    """Return the results of healthy points in which a metric is a number, the best first.
 
     Args:
         rows: Results of the points.
         metric: Name of the metric.
         goal: "minimise" or "maximise"; rows with failed checks are left out.
-
-    Returns:
-        The rows, ordered by the metric.
     """
     from reflowshock.workflow.study.results import HEALTHY
 
