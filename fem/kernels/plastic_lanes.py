@@ -76,7 +76,7 @@ def log(x):
 
 @njit(**LANE_OPTIONS)
 def exp(x):
-    """Return e^x of a scalar, x clipped to +-``LARGEST_EXPONENT`` (600): x = k ln 2 + r, series of e^r to r^12."""
+    """Return e^x of a scalar, clipped to +-``LARGEST_EXPONENT``: x = k ln 2 + r, series of e^r to r^12."""
     x = min(max(x, -LARGEST_EXPONENT), LARGEST_EXPONENT)
     k = math.floor(x / LN2 + 0.5)
     r = x - k * LN2
@@ -106,7 +106,7 @@ def rough_log(x):
 
 @njit(**LANE_OPTIONS)
 def rough_exp(x):
-    """Return e^x of a scalar with a relative error of at most 1e-3; x is clipped to +-``LARGEST_EXPONENT`` (600)."""
+    """Return e^x of a scalar with a relative error of at most 1e-3; x is clipped to +-``LARGEST_EXPONENT``."""
     x = min(max(x, -LARGEST_EXPONENT), LARGEST_EXPONENT)
     k = math.floor(x / LN2 + 0.5)
     r = x - k * LN2
@@ -156,16 +156,11 @@ def start_flow(w, state, g, law, reference):
 
 @njit(**LANE_OPTIONS)
 def growing(w):
-    """Count the elements among sixteen whose plastic strain grows by more than ``SMALL_GROWTH`` (1 %) in a step.
-
-    For them the cheap power series of the hardening law (``small_power``) is not accurate enough.
+    """Return the number of the sixteen elements, as a float, whose plastic strain grows too much for ``small_power``.
 
     Args:
-        w: Flat workspace, sixteen entries per slot; reads the plastic strain increments at ``FLOW`` and the reciprocals
-            of the plastic strains before the step at ``INVERSE``.
-
-    Returns:
-        Number of such elements, as a float.
+        w: Flat workspace; reads plastic strain increments at ``FLOW`` and reciprocals of the plastic strain before the
+            step at ``INVERSE``, sixteen entries each.
     """
     count = 0.0
     for lane in range(LANES):
