@@ -57,5 +57,12 @@ SHAPES = {shape.nodes: shape for shape in (HEXAHEDRON, TETRAHEDRON, TETRAHEDRON_
 
 
 def shape_of(cells: NDArray[np.integer]) -> CellShape:
-    """Return the shape of cells from their number of nodes k, of an array of shape (ne, k); raises ``KeyError``."""
+    """Return the shape of cells (tetrahedron or hexahedron), which follows from their number of nodes.
+
+    Args:
+        cells: Nodes of each cell, shape (ne, k), k = 4, 8 or 10.
+
+    Raises:
+        KeyError: No shape has k nodes.
+    """
     return SHAPES[cells.shape[1]]

@@ -27,13 +27,14 @@ def make_mesh(
     cells: NDArray[np.integer],
     ranks: NDArray[np.int32] | None = None,
 ) -> dolfinx.mesh.Mesh:
-    """Create a distributed mesh without ghost cells; the arrays of all ranks together are the input.
+    """Create a distributed mesh without ghost cells; the arrays of all ranks together are the input; collective.
 
     Args:
         comm: Communicator of the model.
-        points: ``(n, 3)`` [m], this rank's share of the nodes in input order.
-        cells: ``(ne, k)`` input node numbers; k is the same on all ranks and says which shape the cells have.
-        ranks: ``(ne,)`` rank that gets each of these cells; None on all ranks for DOLFINx's own partition.
+        points: This rank's share of the nodes in input order, shape (n, 3) [m].
+        cells: Input node numbers of this rank's share of the cells, shape (ne, k); k, equal on all ranks, gives their
+            shape.
+        ranks: Rank that gets each of these cells, shape (ne,); None on all ranks lets DOLFINx partition the mesh.
     """
     cells, geometry = np.ascontiguousarray(cells, np.int64), GEOMETRIES[cells.shape[1]]
     ghosts = dolfinx.mesh.GhostMode.none
@@ -53,7 +54,11 @@ def make_mesh(
 
 
 def cell_nodes(mesh: dolfinx.mesh.Mesh) -> NDArray[np.int32]:
-    """Return the local geometry nodes of the local cells, in the order of the input: ``(ne, k)``."""
+    """Return the nodes of the cells of this rank, in local numbers and in the node order of the input, shape (ne, k).
+
+    Args:
+        mesh: Mesh distributed by ``make_mesh``.
+    """
     dofmap = mesh.geometry.dofmap
     if OLD:
         return np.asarray(dofmap.array, np.int32).reshape(-1, mesh.geometry.cmap.create_dof_layout().num_dofs)
@@ -61,34 +66,58 @@ def cell_nodes(mesh: dolfinx.mesh.Mesh) -> NDArray[np.int32]:
 
 
 def degree(mesh: dolfinx.mesh.Mesh) -> int:
-    """Return the polynomial degree of the geometry."""
+    """Return the polynomial degree of the geometry of a mesh: 1 for straight edges, 2 for curved ones.
+
+    Args:
+        mesh: Mesh of DOLFINx.
+    """
     return GEOMETRIES[cell_nodes(mesh).shape[1]][1]
 
 
 def input_nodes(mesh: dolfinx.mesh.Mesh) -> NDArray[np.int64]:
-    """Return the input number of each local geometry node: ``(n,)``."""
+    """Return the number that each node of this rank has in the input of ``make_mesh``, shape (n,).
+
+    Args:
+        mesh: Mesh distributed by ``make_mesh``; nodes are in the order of its local numbers.
+    """
     return np.asarray(mesh.geometry.input_global_indices, np.int64)
 
 
 def input_cells(mesh: dolfinx.mesh.Mesh) -> NDArray[np.int64]:
-    """Return the input number of each local cell: ``(ne,)``."""
+    """Return the number that each cell of this rank has in the input of ``make_mesh``, shape (ne,).
+
+    Args:
+        mesh: Mesh distributed by ``make_mesh``; cells are in the order of its local numbers.
+    """
     return np.asarray(mesh.topology.original_cell_index, np.int64)
 
 
 def vector_space(mesh: dolfinx.mesh.Mesh) -> dolfinx.fem.FunctionSpace:
-    """Return the space of vector fields with a value at each node of the mesh."""
+    """Return the function space of vector fields with a value (three components) at each node of a mesh.
+
+    Args:
+        mesh: Mesh of DOLFINx.
+    """
     if OLD:
         return dolfinx.fem.VectorFunctionSpace(mesh, ("Lagrange", degree(mesh)))
     return dolfinx.fem.functionspace(mesh, ("Lagrange", degree(mesh), (3,)))
 
 
 def cell_space(mesh: dolfinx.mesh.Mesh) -> dolfinx.fem.FunctionSpace:
-    """Return the space of fields that are constant in each cell; degree of freedom i belongs to local cell i."""
+    """Return the function space of scalars that are constant in each cell.
+
+    Args:
+        mesh: Mesh of DOLFINx; degree of freedom i belongs to its local cell i.
+    """
     return dolfinx.fem.FunctionSpace(mesh, ("DG", 0)) if OLD else dolfinx.fem.functionspace(mesh, ("DG", 0))
 
 
 def cell_dofs(space: dolfinx.fem.FunctionSpace) -> NDArray[np.int32]:
-    """Return the (blocked) degrees of freedom of the local cells: ``(ne, k)``."""
+    """Return the degrees of freedom of each cell of this rank, shape (ne, k); a vector counts as one.
+
+    Args:
+        space: Function space of DOLFINx.
+    """
     dofs = space.dofmap.list
     cells = space.mesh.topology.index_map(3)
     array = np.asarray(dofs.array if OLD else dofs, np.int32)
@@ -96,9 +125,12 @@ def cell_dofs(space: dolfinx.fem.FunctionSpace) -> NDArray[np.int32]:
 
 
 def quadrature_space(mesh: dolfinx.mesh.Mesh, degree: int, shape: tuple[int, ...]) -> dolfinx.fem.FunctionSpace:
-    """Return the space of values, of tensor shape ``shape`` (() for scalars), at the points of a quadrature rule.
+    """Return the function space of tensors given at the points of a quadrature rule in each cell.
 
-    ``degree`` is the polynomial degree that the rule integrates exactly.
+    Args:
+        mesh: Mesh of DOLFINx.
+        degree: Polynomial degree that the rule integrates exactly.
+        shape: Tensor shape of the values, () for scalars.
     """
     if OLD:
         element = ufl.FiniteElement("Quadrature", mesh.ufl_cell(), degree=degree, quad_scheme="default")
@@ -140,7 +172,11 @@ def at_quadrature_points(
 
 
 def assembled_csr(form) -> scipy.sparse.csr_matrix:  # its type has another name in each version
-    """Return the assembled matrix of a compiled bilinear form, on a single rank."""
+    """Assemble the matrix of a bilinear form as a sparse matrix; only on a single rank.
+
+    Args:
+        form: Form compiled by DOLFINx, such as the result of ``compiled_form``.
+    """
     matrix = dolfinx.fem.petsc.assemble_matrix(form)
     matrix.assemble()
     pointers, columns, values = matrix.getValuesCSR()
@@ -150,7 +186,15 @@ def assembled_csr(form) -> scipy.sparse.csr_matrix:  # its type has another name
 
 
 def compiled_form(form: ufl.Form, flags: list[str]):  # its type has another name in each version
-    """Compile a UFL form with flags of the C compiler, such as ``["-O3"]``, and return it as a DOLFINx form."""
+    """Compile a UFL form to machine code.
+
+    Args:
+        form: Form in UFL.
+        flags: Options of the C compiler, such as ``["-O3"]``.
+
+    Returns:
+        Form of DOLFINx, ready for assembly.
+    """
     if OLD:
         return dolfinx.fem.form(form, jit_params={"cffi_extra_compile_args": flags})
     return dolfinx.fem.form(form, jit_options={"cffi_extra_compile_args": flags})

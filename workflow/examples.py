@@ -34,5 +34,9 @@ EXAMPLES = {
 
 
 def examples(command: str) -> str | None:
-    """Return the examples at the end of a command's help text, one paragraph each; None without examples."""
+    """Return the examples at the end of a command's help text, one paragraph each; None without examples.
+
+    Args:
+        command: Name of the command, such as "run".
+    """
     return "\n\n".join(("Examples:", *EXAMPLES[command])) if command in EXAMPLES else None

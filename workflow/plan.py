@@ -38,11 +38,14 @@ class PlannedStage:
 
 
 def planned_stages(store: Store, point: Point) -> dict[str, PlannedStage]:
-    """Return the planned action of each stage, by name in order: whether it runs, why, and its predicted time [s].
+    """Return the planned action of each stage of a run, in order; nothing is changed.
 
     Args:
         store: Store of the run folder, whose files are examined.
-        point: Point of the run.
+        point: Case with its settings, which determines the run.
+
+    Returns:
+        Name of a stage -> whether it runs, why, and its predicted time [s].
     """
     costs = predicted_costs(store, point.case, stage_seconds(point.case))
     return {
@@ -56,7 +59,7 @@ def plan_record(store: Store, point: Point) -> dict[str, Any]:
 
     Args:
         store: Store of the run folder, whose files are examined.
-        point: Point of the run.
+        point: Case of the run with its settings.
 
     Returns:
         ``case`` (name), ``folder``, ``stages`` (``runs``, ``why``, ``seconds`` by name), ``effects``, ``companions``
@@ -82,7 +85,7 @@ def show_plan(store: Store, point: Point, console: Console) -> None:
 
     Args:
         store: Store of the run folder, whose files are examined; nothing is changed.
-        point: Point of the run.
+        point: Case of the run with its settings.
         console: Console to print to.
     """
     case = point.case
@@ -144,7 +147,7 @@ def predicted_seconds(store: Store, point: Point, until: str) -> float:
 
     Args:
         store: Store of the run folder, whose files are examined.
-        point: Point of the run.
+        point: Case of the run with its settings.
         until: Last stage to run.
     """
     states, costs = examine(store, point), predicted_costs(store, point.case, stage_seconds(point.case))

@@ -98,6 +98,9 @@ def _conclude(store: Store, point: Point) -> str:
 def check_movie(path: Path) -> None:
     """Check that a GIF can be written to a path.
 
+    Args:
+        path: Path of the GIF; an existing GIF may be replaced.
+
     Raises:
         CaseError: The name does not end in .gif, another file exists there, or the folder is missing.
     """
@@ -185,7 +188,7 @@ def verify(store: Store, point: Point) -> bool:
 
     Args:
         store: Store of the run folder; nothing is changed.
-        point: Point of the run.
+        point: Case of the run with its settings.
 
     Returns:
         Whether all products and all files of the run folder are present and unmodified.

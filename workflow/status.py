@@ -50,7 +50,7 @@ def follow_run(store: Store, point: Point, console: Console) -> None:
 
     Args:
         store: Store of the run folder, in which another process runs.
-        point: Point of the run.
+        point: Case of the run with its settings.
         console: Console to print to.
     """
     if not is_busy(store.folder):
@@ -90,7 +90,7 @@ def show_status(store: Store, point: Point, console: Console) -> None:
 
     Args:
         store: Store of the run folder, whose files are checked.
-        point: Point of the run.
+        point: Case of the run with its settings.
         console: Console to print to.
     """
     table = Table(title=f"{point.case.case.name} in {store.folder}", title_justify="left", expand=True)
@@ -121,7 +121,7 @@ def _add_row(table: Table, record: dict | None, title: str, stage: str, state: S
 
 
 def metric_text(metric: dict) -> str:
-    """Format a metric in a customary unit.
+    """Format the value of a metric in a customary unit, such as MPa for stresses.
 
     Args:
         metric: Record with ``value`` (SI) and ``unit``.

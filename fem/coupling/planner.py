@@ -95,6 +95,10 @@ def works_of(divided: DividedModels[Tables], request: RunInput | StructureInput)
     Args:
         divided: Models before distribution, with their meshes on rank 0.
         request: Input of the run, with materials, formulation and kinematics.
+
+    Returns:
+        Role of the model -> its mesh (on rank 0), step level of each cell, steps of each level in a window (the time
+        between two exchanges of the models), and how its elements are computed.
     """
     works: dict[Role, ModelWork] = {}
     for role, tables in divided.tables.items():

@@ -58,6 +58,9 @@ def scheme_of(name: SchemeName, direction: Direction = "two_way") -> Scheme:
         direction: ``two_way``, or ``one_way`` without feedback from meso to macro model; then ``impulse`` is replaced
             by the one-way scheme of held velocity.
 
+    Returns:
+        Object with a method that creates the participants (models with their motion) of a coupled run.
+
     Raises:
         ValueError: ``gravouil_combescure`` with ``one_way``.
     """

@@ -110,11 +110,14 @@ def governing_steps(cells: NDArray[np.int32], tie: "Tie", steps: NDArray[np.floa
 
 
 def least_steps(ratios: tuple[int, ...], limits: StepLimits) -> NDArray[np.float64]:
-    """Return the critical step times ``limits.fraction`` that an element needs at least at each level.
+    """Return the smallest stable step, critical step times safety fraction, that an element must have at each level.
+
+    An element with a smaller one must go to a higher level, with more substeps.
 
     Args:
         ratios: Steps of level k + 1 in one step of level k, outermost first; empty for level 0 alone.
-        limits: Window, fraction and damping; the steps of its elements are not used.
+        limits: Window (step of level 0) [s], fraction of step over critical step, and damping; its elements are not
+            used.
 
     Returns:
         Smallest step at levels 0, 1, ..., shape (levels + 1,) [s].
@@ -126,12 +129,12 @@ def least_steps(ratios: tuple[int, ...], limits: StepLimits) -> NDArray[np.float
 
 @cache
 def reach_of(ratio: int, level: int, damping: float) -> float:
-    """Return the largest stable step of a level's substeps relative to plain leapfrog, dimensionless.
+    """Return the largest stable substep of a level over the stable step of plain leapfrog, dimensionless.
 
-    A level takes ``ratio`` substeps in a step of the surrounding level, see ``Substeps``.
+    The substeps of a level are stabilised by Chebyshev polynomials, see ``Substeps``, which makes them shorter.
 
     Args:
-        ratio: Substeps in one step of the surrounding level.
+        ratio: Substeps of the level in one step of the surrounding level.
         level: Number of the level, 1 for the outermost.
         damping: Coefficient beta of stiffness-proportional damping over the window, dimensionless.
     """

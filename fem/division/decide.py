@@ -46,11 +46,18 @@ class MeshEstimate:
 def decide_scheme(rules: Rules, steps: NDArray[np.float64], linear: bool, has_buffer: Callable[[], bool]) -> Choice:
     """Return the coupling scheme that the user sets or that the problem calls for, with the reason.
 
+    One-way coupling uses ``held_velocity``; a scheme set by the user stays; with "auto", linear models without springs
+    and with little stiffness-proportional damping use ``local_steps``, others the scheme of ``division.choose_scheme``.
+
     Args:
-        rules: Rules of the division.
+        rules: Settings of the division: coupling, supports and damping.
         steps: Critical steps of all cells, shape (ne,) [s].
         linear: Whether all forces are linear in the displacement.
-        has_buffer: Returns whether layers of board fit between the joints and the macro model.
+        has_buffer: Function without arguments that returns whether layers of board fit between the joints and the macro
+            model; called only for "auto".
+
+    Returns:
+        Name of the scheme and the reason as text.
 
     Raises:
         CouplingError: Local steps are set, and supports have springs.
@@ -120,6 +127,9 @@ def in_local_steps(
         plan: Windows; the substeps follow from the levels.
         most_levels: Largest number of levels below the window.
 
+    Returns:
+        Division with the step level of each cell, the ratios of steps between levels, and the windows.
+
     Raises:
         LevelError: The critical steps differ by more than the levels allow.
     """
@@ -138,6 +148,9 @@ def in_path_levels(division: Division, rules: Rules, limits: StepLimits, around:
         limits: Critical steps [s] and costs of all cells.
         around: Function that takes a mask of cells and returns the mask of the meso cells that share a node with them,
             also through ties, shape (ne,) each.
+
+    Returns:
+        Division with the same cells and windows; levels of the meso cells, ratios between levels and substeps are new.
     """
     return with_path_levels(division, limits, around, rules.coupling.most_levels)
 
@@ -151,6 +164,9 @@ def divide_estimate(estimate: MeshEstimate, rules: Rules) -> Division:
     Args:
         estimate: Parts of the mesh.
         rules: Rules of the division, whose masks have shape (n,).
+
+    Returns:
+        Division: scheme with its reason, masks of the rows in each model, level of each row, windows and substeps.
 
     Raises:
         CouplingError: Local steps are set, and supports have springs.

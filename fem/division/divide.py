@@ -61,6 +61,9 @@ def scheme_for(whole: Whole, survey: Survey, rules: Rules) -> Choice:
         survey: Critical steps and linearity of its cells.
         rules: Settings; ``coupling.scheme`` other than "auto" is returned unchanged.
 
+    Returns:
+        Name of the scheme and the reason as text.
+
     Raises:
         CouplingError: Local steps are set, and supports have springs.
     """

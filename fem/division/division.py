@@ -133,17 +133,21 @@ class Choice:
 
 
 def choose_scheme(elastic: bool, buffer_possible: bool) -> Choice:
-    """Choose the scheme of a two-way run with ``scheme = "auto"``.
+    """Choose the coupling scheme of a two-way run with ``scheme = "auto"``, with the reason as text.
 
-    All schemes are stable at the steps that a run chooses (benchmarks/coupling_stability.py). Local steps conserve
-    energy and momentum, but support no path-dependent materials: plastic strains would follow a mean motion and be
-    wrong by a factor of two (PHYSICS 4). Held velocity advances both models concurrently. Impulses conserve momentum
-    exactly with path-dependent materials, but the models alternate, so they are used only on request.
+    The choice is ``local_steps`` for an elastic meso model, else ``held_velocity`` if a buffer is possible, else
+    ``gravouil_combescure``. All schemes are stable at the steps that a run chooses (benchmarks/coupling_stability.py).
+    Local steps conserve energy and momentum, but support no path-dependent materials: plastic strains would follow a
+    mean motion and be wrong by a factor of two (PHYSICS 4). Held velocity advances both models concurrently. Impulses
+    conserve momentum exactly with path-dependent materials, but the models alternate, so they are used only on request.
     Gravouil-Combescure dissipates energy at the interface, and the models alternate, too.
 
     Args:
         elastic: Whether the whole meso model is linear elastic at small strains.
         buffer_possible: Whether two layers of board fit between fine cells and the macro model.
+
+    Returns:
+        Name of the scheme and the reason as text.
     """
     if elastic:
         return Choice("local_steps", "all elements with small steps are linear elastic at small strains")

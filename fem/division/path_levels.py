@@ -35,6 +35,9 @@ def with_path_levels(division: Division, limits: StepLimits, around: Around, mos
         around: Function that takes a mask of cells and returns the mask of the meso cells that share a node with them,
             also through ties, shape (ne,) each.
         most: Largest number of levels.
+
+    Returns:
+        Division with the same cells and windows; levels of the meso cells, ratios between levels and substeps are new.
     """
     plan, finer = division.plan, FinerCells(division.meso, limits, around)
 
@@ -58,13 +61,17 @@ def _candidates(substeps: int, most: int) -> Iterator[tuple[int, ...]]:
 
 
 def opaque_ratio(fraction: float) -> float:
-    """Return the ratio of a cell's step limit to the larger step above which one layer decays as much as two.
+    """Return the ratio of steps below which a cell with a small step needs a second layer of cells around it.
 
-    Cells below this ratio get a second layer of cells around them. The decay exponent doubles if
-    arcosh(r x) = 2 arcosh(x).
+    Fast motion decays outwards from small steps, layer by layer. In a layer whose largest stable step is r times the
+    step of the cells outside, it decays as much as in two layers with r = 1 if arcosh(r x) = 2 arcosh(x), x = pi / (2
+    fraction).
 
     Args:
-        fraction: Step over critical step, the same for both; the result is dimensionless, too.
+        fraction: Time step over critical time step, the same for both steps, dimensionless.
+
+    Returns:
+        Ratio r, dimensionless, above one.
     """
     just = 0.5 * math.pi / fraction
     return 2.0 * just - 1.0 / just

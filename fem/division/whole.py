@@ -131,6 +131,10 @@ def add_spring_stiffness(
         mesh: Mesh of these elements.
         table: Facets of the elastic supports; None returns the same critical steps.
         supports: Name -> support with its stiffness per area [N/m^3].
+
+    Returns:
+        The survey (role, critical step, mass, linearity and cost of each element) with smaller critical steps at the
+        facets.
     """
     added_frequency = np.zeros(len(survey.plain_step))  # squared circular frequency [1/s^2]
     for name, facets in table.bedded.items() if table else ():

@@ -46,6 +46,10 @@ def natural_modes(equations: Equations, count: int) -> Modes:
         equations: Numbered equations of the model.
         count: Number of modes, less than the number of equations.
 
+    Returns:
+        Natural frequencies in ascending order, shape (k,) [Hz]; mode shapes at the nodes of this rank with unit modal
+        mass, shape (k, n, 3); effective modal masses for base excitation along x, y, z, shape (k, 3) [kg].
+
     Raises:
         ValueError: ``count`` is out of range, or there are several ranks and no SLEPc.
         AgreedError: Fewer than ``count`` modes converged; on every rank.

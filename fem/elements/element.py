@@ -62,6 +62,10 @@ def element_geometry(points: NDArray[np.float64], cells: NDArray[np.int32]) -> G
         points: Nodes, shape (n, 3) [m].
         cells: Nodes of each element, shape (ne, k), k = 4, 8 or 10.
 
+    Returns:
+        Volume of each node in each element, shape (ne, k) [m^3]; volume average of the gradient of each shape function,
+        shape (ne, k, 3) [1/m]; smallest Jacobian determinant at the integration points, shape (ne,) [m^3].
+
     Raises:
         MeshError: The Jacobian determinant of an element is not positive at an integration point.
     """

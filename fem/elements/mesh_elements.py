@@ -26,6 +26,9 @@ def elements_of(
         part: Index of each cell into ``materials``, shape (ne,).
         materials: Material of each part: elasticity and density.
         formulation: Formulation of hexahedra, ``incompatible_modes`` or ``one_point``; not used for tetrahedra.
+
+    Returns:
+        Nodes, cells, elasticity and density of each material, material of each cell, and kind of element.
     """
     return Elements(
         points=points,

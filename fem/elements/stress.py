@@ -32,7 +32,11 @@ def element_stress(
 
 
 def von_mises(stress: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the von Mises stress, shape (m,), of stresses xx yy zz xy yz xz, shape (m, 6), in the same unit."""
+    """Return the von Mises stresses of several points, shape (m,), in the unit of the stresses.
+
+    Args:
+        stress: Stresses xx, yy, zz, xy, yz, xz, shape (m, 6).
+    """
     xx, yy, zz, xy, yz, xz = stress.T
     return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * (xy**2 + yz**2 + xz**2))
 

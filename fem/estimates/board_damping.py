@@ -12,19 +12,26 @@ SOURCE = "Steinberg 2000, eq. 9.52"
 
 
 def estimated_ratio(frequency: float) -> float:
-    """Return the ratio of critical damping 1 / (2 Q) of a board's first mode, Q = sqrt(f1) with f1 in [Hz].
+    """Estimate the ratio of critical damping 1 / (2 Q) of a board's first mode, Q = sqrt(f1 / Hz) the quality factor.
 
-    Meant for circuit boards that respond in one bending mode; limited to less than one, which it reaches at 1/4 Hz.
+    Intended for circuit boards that respond in one bending mode; limited to less than one, which it reaches at 1/4 Hz.
+
+    Args:
+        frequency: Natural frequency f1 of the first mode [Hz].
     """
     return min(0.5 / math.sqrt(frequency), 1.0 - 1e-6)
 
 
 def with_estimate(damping: BoardDamping, frequency: float) -> BoardDamping:
-    """Return the damping of a case, with the estimate where the case gives none.
+    """Return the damping of a board, estimated from its first natural frequency unless the case gives damping.
 
     Args:
-        damping: Damping of the case.
+        damping: Damping of the case; it is returned unchanged if it has coefficients or ratios or switches the estimate
+            off.
         frequency: First natural frequency of the board [Hz].
+
+    Returns:
+        Damping proportional to the mass, with the ratio of ``estimated_ratio`` at this frequency.
     """
     if damping.estimate == "off" or damping.is_given:
         return damping

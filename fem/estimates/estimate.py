@@ -120,6 +120,9 @@ def window_plan(macro_step: float, meso_step: float, fraction: float, duration: 
         fraction: Time step over critical time step.
         duration: Simulated time [s]; a whole number of samples, each a whole number of windows.
         samples: Requested number of history samples; the plan has fewer if there are fewer windows.
+
+    Returns:
+        Window [s], meso substeps per window, number of windows, and windows from one history sample to the next.
     """
     least = math.ceil(duration / (fraction * macro_step))
     samples = min(samples, least)
@@ -136,6 +139,9 @@ def implicit_plan(plan: WindowPlan, largest: float) -> WindowPlan:
     Args:
         plan: Plan of a run whose sample times are kept.
         largest: Largest implicit step [s].
+
+    Returns:
+        Window [s], implicit steps per window, number of windows; every window ends at a sample.
     """
     spacing = plan.stride * plan.window
     return WindowPlan(spacing, math.ceil(spacing / largest), plan.windows // plan.stride, 1)
@@ -147,6 +153,9 @@ def shorten_plan(plan: WindowPlan, duration: float) -> WindowPlan:
     Args:
         plan: Plan with windows and windows per sample.
         duration: New simulated time [s].
+
+    Returns:
+        Plan with the same windows and substeps, and fewer windows unless the duration exceeds the plan.
     """
     samples = math.ceil(duration / (plan.stride * plan.window) * (1.0 - ROUNDING))
     return replace(plan, windows=min(plan.windows, plan.stride * samples))

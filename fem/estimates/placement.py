@@ -81,6 +81,9 @@ def shared(roles: Sequence[Role], size: int) -> Placement:
     Args:
         roles: Models (``macro``, ``meso`` or ``dns``) in the order in which a rank computes them.
         size: Number of ranks.
+
+    Returns:
+        Ranks of each model, all of them in ascending order.
     """
     return Placement(dict.fromkeys(roles, tuple(range(size))))
 
@@ -91,6 +94,9 @@ def disjoint(macro: Sequence[int], size: int) -> Placement:
     Args:
         macro: Ranks of the macro model, from 0.
         size: Number of all ranks.
+
+    Returns:
+        Ranks of each model in ascending order.
     """
     others = tuple(rank for rank in range(size) if rank not in macro)
     return Placement({"macro": tuple(sorted(macro)), "meso": others})

@@ -131,6 +131,9 @@ def implicit_cost(nodes: tuple[int, int, int], steps: int) -> SolverCost:
     Args:
         nodes: Number of nodes along x, y and z.
         steps: Number of time steps.
+
+    Returns:
+        Number of steps, total time and time before the first step on one core [s], and memory [B].
     """
     factor, equations = box_factor(nodes), 3 * math.prod(nodes)
     setup = factor.operations / FACTOR_RATE + ASSEMBLY_SECONDS * equations
@@ -145,6 +148,9 @@ def cooling_cost(elements: int, yielding: int) -> SolverCost:
     Args:
         elements: Number of hexahedra.
         yielding: Number of them whose material may yield.
+
+    Returns:
+        Number of steps, total time and time before the first step on one core [s], and memory [B].
     """
     solutions = COOLING_SOLUTIONS if yielding else 1
     cost = implicit_cost(plate_nodes(elements), solutions)
@@ -204,6 +210,9 @@ def box_factor(nodes: tuple[int, int, int]) -> FactorSize:
 
     Args:
         nodes: Nodes along each side.
+
+    Returns:
+        Number of floating-point operations of the factorisation, and number of entries of the factor.
     """
     operations, entries = _dissect(nodes, (False,) * 6)
     return FactorSize(OPERATIONS_FACTOR * operations, ENTRIES_FACTOR * entries)

@@ -49,6 +49,9 @@ def linear_energy(term: InternalForce, displacement: NDArray[np.float64], mean: 
         displacement: Nodal displacement u, shape (n, 3) [m].
         mean: Mean strains of elements with hourglass control, which split the energy into strain and hourglass energy;
             None if all of it is strain energy.
+
+    Returns:
+        Elastic strain energy, plastic work (zero) and hourglass energy [J].
     """
     force = np.zeros_like(displacement)
     term.add(displacement, force)

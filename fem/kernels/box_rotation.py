@@ -10,9 +10,8 @@ Q^ = H q^ and M = T U,
 is the force on F and R Q^_k the force on q_k; [w]x is the matrix of the cross product. It arises because a change of F
 rotates the frame by omega, (tr(U) 1 - U) omega = axial(R^T dF - dF^T R). Energy and momenta are conserved.
 
-Rows, lines and faces are defined in ``kernels.box_rows``, modes in ``force_congruent``. Sixteen boxes of a row, or
-sixteen boxes of any shapes, are computed side by side as in ``kernels.lanes``. The workspace ``w`` has
-component c of mode p of box e at 16 (3 p + c) + e, then entries i of F at 384 + 16 i + e and of R at 528 + 16 i + e.
+Rows, lines and faces: ``kernels.box_rows``, modes: ``force_congruent``, lanes: ``kernels.lanes``. The workspace
+``w`` has component c of mode p of box e at 16 (3 p + c) + e, entries of F at 384 + 16 i + e, of R at 528 + 16 i + e.
 """
 
 import numpy as np
@@ -49,7 +48,7 @@ def read_modes(faces, start, w):
 
     Args:
         faces: Component c of face parity k at node i at ``(4 c + k) WIDTH + FIRST + i``, shape (12 WIDTH,) [m].
-        start: First of the sixteen boxes in the row.
+        start: Number of the first of the sixteen boxes in the row, integer.
         w: Workspace (672,); writes component c of mode p (bit d: odd along d) of box e to ``16 (3 p + c) + e`` [m].
     """
     for k in range(4):
@@ -68,8 +67,8 @@ def add_faces(w, start, count, faces):
 
     Args:
         w: Workspace (672,); force on component c of mode p (bit d: odd along d) of box e at ``16 (3 p + c) + e`` [N].
-        start: First of the sixteen boxes in the row.
-        count: Number of these boxes that are added; the others repeat the last box of the row.
+        start: Number of the first of the sixteen boxes in the row, integer.
+        count: Number of these boxes that are added, integer; the others repeat the last box of the row.
         faces: Component c of face parity k at node i at ``(4 c + k) WIDTH + FIRST + i``, (12 WIDTH,) [N], added to.
     """
     for k in range(4):
@@ -106,9 +105,9 @@ def transform_corners(w):
 
 @njit(**LANE_OPTIONS)
 def write_deformation(k, w):
-    """Write the mean deformation gradients F of sixteen boxes; ``k (480,)`` from ``spread_shape`` scales modes to F.
+    """Write the mean deformation gradients F of sixteen boxes; ``k (480,)``: constants by ``spread_shape``.
 
-    ``w (672,)``: reads component c of mode p of box e at ``16 (3 p + c) + e`` [m], writes F at ``384 + 16 i + e``.
+    ``w (672,)``: reads mode p of box e at ``16 (3 p + c) + e`` [m], writes F, row by row, at ``384 + 16 i + e``.
     """
     for lane in range(LANES):
         scale, x, y, z = three(k, SCALE + lane), three(w, X + lane), three(w, Y + lane), three(w, Z + lane)
@@ -122,10 +121,10 @@ def write_deformation(k, w):
 
 @njit(**LANE_OPTIONS)
 def stress(k, u):
-    """Return the stress times volume T = V C : (U - 1) as six scalars xx, yy, zz, xy, yz, xz [J].
+    """Return the stress of a box times its volume, T = V C : (U - 1), as six scalars xx, yy, zz, xy, yz, xz [J].
 
-    ``u``: U, six scalars in this order; ``k``: nine scalars or more, V times C_xx, C_yy, C_zz, C_xy, C_yz, C_xz, G_xy,
-    G_yz, G_xz [J].
+    ``u``: stretch U, six scalars in this order; ``k``: nine scalars or more, V times C_xx, C_yy, C_zz, C_xy, C_yz,
+    C_xz, G_xy, G_yz, G_xz [J].
     """
     x, y, z = u[0] - 1.0, u[1] - 1.0, u[2] - 1.0
     return (
@@ -140,9 +139,10 @@ def stress(k, u):
 
 @njit(**LANE_OPTIONS)
 def resistance(k, a, b, c, d):
-    """Return the forces Q^ [N] on the modes xy, xz, yz, xyz of a box, four tuples of three scalars.
+    """Return the elastic forces Q^ [N] on the modes xy, xz, yz, xyz of one box, four tuples of three scalars.
 
-    ``k`` are 27 constants of ``box_constants``; ``a`` to ``d`` the amplitudes of the modes, three scalars each [m].
+    ``k``: the 27 scalars of ``box_constants`` [J, N/m]; ``a`` to ``d``: three scalars each, amplitudes of the modes
+    [m].
     """
     return (
         (k[18] * a[0] + k[19] * c[2], k[15] * a[1] + k[16] * b[2], k[11] * c[0] + k[13] * b[1] + k[14] * a[2]),
@@ -171,7 +171,7 @@ def spin(u, moment):
 def resist(k, w):
     """Replace the modes xy, xz, yz, xyz of sixteen boxes by the forces on them [N]; write their moments [J] to mode 0.
 
-    ``w (672,)``: p = 3, 5, 6, 7 of box e at ``16 (3 p + c) + e``, R at ``528 + 16 i + e``; ``k`` from ``spread_shape``.
+    ``w (672,)``: p = 3, 5, 6, 7 at ``16 (3 p + c) + e``, rotations R at ``528 + 16 i + e``; ``k`` by ``spread_shape``.
     """
     for lane in range(LANES):
         back = transposed(nine(w, ROTATION + lane))
@@ -188,9 +188,10 @@ def resist(k, w):
 
 @njit(**LANE_OPTIONS)
 def write_stress(k, w):
-    """Replace the deformation gradients F of sixteen boxes by forces P [J] on them; ``k (480,)`` from ``spread_shape``.
+    """Replace deformation gradients F of sixteen boxes by nominal stresses times volume P [J], the forces on F.
 
-    ``w (672,)``: F, then P, of box e by rows at ``384 + 16 i + e``, R at ``528 + 16 i + e``, moments at ``16 c + e``.
+    ``w (672,)``: F, then P, of box e row by row at ``384 + 16 i + e``; reads its rotation R at ``528 + 16 i + e`` and
+    the moment of its higher modes at ``16 c + e`` [J]. ``k (480,)``: constants of the boxes by ``spread_shape``.
     """
     for lane in range(LANES):
         r, higher = nine(w, ROTATION + lane), three(w, lane)
@@ -204,9 +205,9 @@ def write_stress(k, w):
 
 @njit(**LANE_OPTIONS)
 def write_linear_forces(k, w):
-    """Write the forces [N] on constant and linear modes of sixteen boxes; ``k (480,)`` from ``spread_shape``.
+    """Write the forces [N] on constant and linear modes of sixteen boxes; ``k (480,)``: constants by ``spread_shape``.
 
-    ``w (672,)``: reads P at ``384 + 16 i + e`` [J], writes modes p = 0 (zero), 1, 2, 4 to ``16 (3 p + c) + e``.
+    ``w (672,)``: reads stress P at ``384 + 16 i + e`` [J], writes modes p = 0 (zero), 1, 2, 4 to ``16 (3 p + c) + e``.
     """
     for lane in range(LANES):
         p, scale = nine(w, DEFORMATION + lane), three(k, SCALE + lane)
@@ -232,10 +233,10 @@ def turn_higher(w):
 
 @njit(cache=True)
 def replace_by_forces(k, w):
-    """Replace the modes [m] of sixteen boxes by the forces on them [N]; ``k (480,)`` from ``spread_shape``.
+    """Replace the modes [m] of sixteen boxes by the forces on them [N]; ``k (480,)``: constants by ``spread_shape``.
 
-    ``w (672,)``: mode p of box e at ``16 (3 p + c) + e``, F at ``384 + 16 i + e``, R at ``528 + 16 i + e``.
-    The loops are short and unrolled: otherwise the compiler does not vectorise them, which triples the time.
+    ``w (672,)``: mode p of box e, then its force, at ``16 (3 p + c) + e``; reads rotation R at ``528 + 16 i + e`` and F
+    at ``384 + 16 i + e`` (overwritten). The loops are short and unrolled: only then does the compiler vectorise them.
     """
     resist(k, w)
     write_stress(k, w)
@@ -266,8 +267,8 @@ def spread_shape(constants, scale, k):
 def box_energies(w, lane, k):
     """Return the energies of the mean strain and of the higher modes of box ``lane`` (0 to 15), two scalars [J].
 
-    ``w (672,)``: component c of mode p at ``16 (3 p + c) + lane`` [m], F at ``384 + 16 i + lane``, R at ``528 + 16 i +
-    lane``; ``k``: 27 constants of the box, scalars of ``own_constants``.
+    ``w (672,)``: component c of mode p at ``16 (3 p + c) + lane`` [m], deformation gradient F at ``384 + 16 i + lane``,
+    rotation R at ``528 + 16 i + lane``; ``k``: 27 constants of the box, scalars of ``own_constants``.
     """
     higher, r = 0.0, nine(w, ROTATION + lane)
     u, back = stretch(r, nine(w, DEFORMATION + lane)), transposed(r)

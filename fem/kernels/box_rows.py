@@ -64,13 +64,14 @@ def subtract_lines(nodes, axes, lines, values):
 
 @njit(inline="always")
 def transform_lines(line, starts, count, faces):
-    """Compute the Walsh-Hadamard transform of one component over the four lines of a row.
+    """Compute sums and differences of one component over the four lines of a row (Walsh-Hadamard transform).
 
     Args:
-        line: Component at all positions of the lines, shape (>= p,).
+        line: Component, such as the displacement along x [m], at all positions of the lines, shape (>= p,).
         starts: Positions at which the four lines of the row begin, second direction first, shape (4,).
-        count: Number of nodes along the row.
-        faces: Written: transform of parity k at node i at ``faces[k, FIRST + i]``, shape (4, >= FIRST + count).
+        count: Number of nodes along the row, integer.
+        faces: Written: ``faces[k, FIRST + i]`` is the sum over the four nodes i of the lines, with signs that change
+            along the second direction if bit 0 of k is set, along the third if bit 1 is; shape (4, >= FIRST + count).
     """
     a, b = line[starts[0] : starts[0] + count], line[starts[1] : starts[1] + count]
     c, d = line[starts[2] : starts[2] + count], line[starts[3] : starts[3] + count]
@@ -82,12 +83,16 @@ def transform_lines(line, starts, count, faces):
 
 @njit(inline="always")
 def add_transform(faces, starts, count, line):
-    """Add the Walsh-Hadamard transform of face values to one component of the four lines of a row.
+    """Add face values, transformed back to the nodes, to one component of the four lines of a row.
+
+    This is the transpose of ``transform_lines``: forces on sums and differences become forces on the nodes.
 
     Args:
-        faces: Value of parity k at node i at ``faces[k, FIRST + i]``, shape (4, >= FIRST + count).
+        faces: Value of parity k at node i at ``faces[k, FIRST + i]``, such as a force [N]; it acts on the four nodes
+            with signs that change along the second direction if bit 0 of k is set, along the third if bit 1 is; shape
+            (4, >= FIRST + count).
         starts: Positions at which the four lines of the row begin, second direction first, shape (4,).
-        count: Number of nodes along the row.
+        count: Number of nodes along the row, integer.
         line: Component at all positions of the lines, shape (>= p,), added to.
     """
     a, b = line[starts[0] : starts[0] + count], line[starts[1] : starts[1] + count]
@@ -105,16 +110,18 @@ def add_transform(faces, starts, count, line):
 def couple_inner(pair, k, count, faces, forces):
     """Write the face forces of one parity at the inner nodes of a row of equal boxes, from their stiffness blocks.
 
-    Component 0 is taken at parity k, component 1 at k XOR 1, component 2 at k XOR 2.
+    Face values are sums and differences over the four lines of the row, see ``transform_lines``. Component 0 is taken
+    at parity k, component 1 at k XOR 1, component 2 at k XOR 2.
 
     Args:
-        pair: Even and odd block E and O of the parity, entries 00 01 02 11 12 22, shape (2, 6) [N/m].
-        k: Parity across the row, 0 to 3.
-        count: Number of boxes in the row.
-        faces: Transformed displacements, component by parity by node (first node at column FIRST), shape (3, 4,
-            COLUMNS) [m].
-        forces: Transformed forces in the same order, shape (3, 4, COLUMNS) [N]; nodes 1 to ``count - 1`` are written,
-            up to whole vectors.
+        pair: Even and odd block E and O of the parity along the row, symmetric 3 x 3 matrices with entries 00 01 02 11
+            12 22, shape (2, 6) [N/m].
+        k: Parity across the row, integer 0 to 3.
+        count: Number of boxes in the row, integer.
+        faces: Face values of the displacement, component by parity by node (first node at column ``FIRST``), shape (3,
+            4, COLUMNS) [m].
+        forces: Face values of the force in the same order, shape (3, 4, COLUMNS) [N]; nodes 1 to ``count - 1`` are
+            written, up to whole vectors.
     """
     e, o = pair[0], pair[1]
     x, y, z = faces[0, k, FIRST:], faces[1, k ^ 1, FIRST:], faces[2, k ^ 2, FIRST:]
@@ -134,13 +141,17 @@ def couple_inner(pair, k, count, faces, forces):
 def couple_ends(pair, k, count, faces, forces):
     """Write the face forces of one parity at the first and last node of a row, which belong to one box only.
 
+    Face values are sums and differences over the four lines of the row, see ``transform_lines``.
+
     Args:
-        pair: Even and odd block E and O of the parity, entries 00 01 02 11 12 22, shape (2, 6) [N/m].
-        k: Parity across the row, 0 to 3.
-        count: Number of boxes in the row.
-        faces: Transformed displacements, component by parity by node (first node at column FIRST), shape (3, 4,
-            COLUMNS) [m].
-        forces: Transformed forces in the same order, shape (3, 4, COLUMNS) [N]; nodes 0 and ``count`` are written.
+        pair: Even and odd block E and O of the parity along the row, symmetric 3 x 3 matrices with entries 00 01 02 11
+            12 22, shape (2, 6) [N/m].
+        k: Parity across the row, integer 0 to 3.
+        count: Number of boxes in the row, integer.
+        faces: Face values of the displacement, component by parity by node (first node at column ``FIRST``), shape (3,
+            4, COLUMNS) [m].
+        forces: Face values of the force in the same order, shape (3, 4, COLUMNS) [N]; nodes 0 and ``count`` are
+            written.
     """
     e, o = pair[0], pair[1]
     x, y, z = faces[0, k], faces[1, k ^ 1], faces[2, k ^ 2]
@@ -156,13 +167,13 @@ def couple_ends(pair, k, count, faces, forces):
 
 @njit(cache=True, fastmath=FINITE)
 def add_row_forces(rows, blocks, displacement, force):
-    """Add K u of rows of equal boxes.
+    """Add the internal force K u of rows of equal linear elastic boxes; the caller subtracts it from the nodal force.
 
     Args:
-        rows: Positions at which the four lines of nodes of each row begin (second direction first), number of boxes (at
-            most ``LONGEST``), index into ``blocks``; shape (nr, 6) int32.
-        blocks: Stiffness blocks of each shape and parity, entries 00 01 02 11 12 22, divided by 8, shape (ns, 8, 6)
-            [N/m].
+        rows: One row per row of boxes, shape (nr, 6) int32: positions at which its four lines of nodes begin (second
+            direction first), number of boxes (at most ``LONGEST``), index into ``blocks``.
+        blocks: Stiffness of each shape and parity (bit d: odd along direction d), entries 00 01 02 11 12 22 divided by
+            8, shape (ns, 8, 6) [N/m].
         displacement: Displacement u, component by position in the lines, shape (3, >= p + PAD) [m]; finite in the
             padding.
         force: K u, component by position in the lines, shape (3, >= p + PAD) [N], added to.

@@ -15,7 +15,7 @@ def add_block_force(pointer, columns, blocks, displacement, force):
     the test for negative ones at each access.
 
     Args:
-        pointer: First block of each row, and the number of blocks, shape (n + 1,) int32.
+        pointer: Index of the first block of each row, then the number of blocks, shape (n + 1,) int32.
         columns: Column (node) of each block, shape (nb,) int32.
         blocks: Upper blocks of K, diagonal ones halved, shape (nb, 3, 3) [N/m].
         displacement: Nodal displacement u, shape (>= n, 3) [m].

@@ -203,7 +203,7 @@ def largest_of(values):
 
 @njit(cache=True)
 def product(left, right):
-    """Return the scalar product of two vectors, each of shape (k,)."""
+    """Return the scalar product of two vectors, both arrays of shape (k,), as a scalar."""
     total = 0.0
     for k in range(len(left)):
         total += left[k] * right[k]
@@ -212,11 +212,11 @@ def product(left, right):
 
 @njit(cache=True)
 def solve(matrix, right):
-    """Solve a symmetric positive definite linear system in place by Gaussian elimination.
+    """Solve a symmetric positive definite linear system A x = b in place by Gaussian elimination.
 
     Args:
-        matrix: Matrix of the system, shape (k, k), overwritten by its upper triangular factor.
-        right: Right-hand side on entry, solution on return, shape (k,).
+        matrix: Matrix A, shape (k, k), overwritten by its upper triangular factor.
+        right: Right-hand side b on entry, solution x on return, shape (k,).
     """
     size = len(right)
     for pivot in range(size):

@@ -35,7 +35,14 @@ GAUSS_VALUES = 0.125 * np.prod(1.0 + GAUSS[:, None, :] * SIDES, axis=2)
 
 @njit(cache=True, fastmath=FINITE)
 def add_product(left, right, scale, result):
-    """Add ``scale * left @ right`` to ``result``; shapes (m, k), (k, n) and (m, n), ``scale`` a scalar."""
+    """Add ``scale * left @ right`` to ``result``, in place, for matrices of shapes (m, k), (k, n) and (m, n).
+
+    Args:
+        left: First factor, shape (m, k).
+        right: Second factor, shape (k, n).
+        scale: Scalar factor.
+        result: Matrix, shape (m, n), added to.
+    """
     for i in range(left.shape[0]):
         for k in range(left.shape[1]):
             factor = scale * left[i, k]
@@ -70,11 +77,12 @@ def invert_jacobian(points, derivatives, jacobian, inverse):
 
 @njit(cache=True)
 def write_strain_columns(strain, column, gx, gy, gz):
-    """Write three columns of a strain matrix, for the three displacement components of one function.
+    """Write three columns of a strain matrix, for the three displacement components of one shape function.
 
     Args:
-        strain: Strain matrix, rows xx, yy, zz, xy, yz, xz (engineering shear), shape (6, k) [1/m].
-        column: First of the columns, for the component along x.
+        strain: Strain matrix, rows xx, yy, zz, xy, yz, xz (engineering shear), shape (6, k) [1/m]; three columns are
+            written.
+        column: Number of the first of these columns, for the component along x, integer.
         gx: Derivative of the function along x, scalar [1/m].
         gy: Derivative along y, scalar [1/m].
         gz: Derivative along z, scalar [1/m].
@@ -135,11 +143,13 @@ def orthonormal_linear(weights, basis):
 def linear_divergence(weights, gradient, basis, result):
     """Compute the least-squares linear part of the shape-function gradients of a hexahedron (B-bar dilatation).
 
+    Each gradient component is a function of the position in the element; it is fitted by 1, xi, eta, zeta.
+
     Args:
         weights: Weights of the Gauss points, shape (8,) [m^3].
         gradient: Gradient of each shape function, Gauss point by node by direction, shape (8, 8, 3) [1/m].
-        basis: Workspace of shape (4, 8), overwritten by ``orthonormal_linear``.
-        result: Written: linear part of the gradients, shape (8, 8, 3) [1/m].
+        basis: Workspace of shape (4, 8), overwritten by the orthonormal linear functions at the Gauss points.
+        result: Written: linear part of the gradients in the order of ``gradient``, shape (8, 8, 3) [1/m].
     """
     orthonormal_linear(weights, basis)
     result[:] = 0.0

@@ -19,8 +19,8 @@ def nine(values, at):
     """Return the 3 x 3 matrix of one element as nine scalars, row by row.
 
     Args:
-        values: Flat array of sixteen elements; entry k of the matrix is ``values[at + 16 * k]``.
-        at: Position of its first entry, a multiple of 16 plus the number of the element (0 to 15).
+        values: Flat array of sixteen elements, shape (>= at + 129,); entry k of the matrix is ``values[at + 16 * k]``.
+        at: Position of its first entry, integer: a multiple of 16 plus the number of the element (0 to 15).
     """
     return (
         values[at],
@@ -37,12 +37,13 @@ def nine(values, at):
 
 @njit(**LANE_OPTIONS)
 def put_nine(values, at, m):
-    """Write the 3 x 3 matrix of one element among sixteen.
+    """Write the 3 x 3 matrix of one element into an array of sixteen elements.
 
     Args:
-        values: Flat array of sixteen elements; entry k of the matrix is written to ``values[at + 16 * k]``.
-        at: Position of its first entry, a multiple of 16 plus the number of the element (0 to 15).
-        m: Matrix, nine scalars row by row.
+        values: Flat array of sixteen elements, shape (>= at + 129,); entry k of the matrix is written to ``values[at +
+            16 * k]``.
+        at: Position of its first entry, integer: a multiple of 16 plus the number of the element (0 to 15).
+        m: Matrix, a tuple of nine scalars row by row.
     """
     values[at], values[at + LANES], values[at + 2 * LANES] = m[0], m[1], m[2]
     values[at + 3 * LANES], values[at + 4 * LANES], values[at + 5 * LANES] = m[3], m[4], m[5]
@@ -54,8 +55,8 @@ def six(values, at):
     """Return the symmetric 3 x 3 matrix of one element as six scalars: xx, yy, zz, xy, yz, xz.
 
     Args:
-        values: Flat array of sixteen elements; entry k of the matrix is ``values[at + 16 * k]``.
-        at: Position of its first entry, a multiple of 16 plus the number of the element (0 to 15).
+        values: Flat array of sixteen elements, shape (>= at + 81,); entry k of the matrix is ``values[at + 16 * k]``.
+        at: Position of its first entry, integer: a multiple of 16 plus the number of the element (0 to 15).
     """
     return (
         values[at],
@@ -69,12 +70,13 @@ def six(values, at):
 
 @njit(**LANE_OPTIONS)
 def put_six(values, at, m):
-    """Write the symmetric 3 x 3 matrix of one element among sixteen.
+    """Write the symmetric 3 x 3 matrix of one element into an array of sixteen elements.
 
     Args:
-        values: Flat array of sixteen elements; entry k of the matrix is written to ``values[at + 16 * k]``.
-        at: Position of its first entry, a multiple of 16 plus the number of the element (0 to 15).
-        m: Matrix, six scalars: xx, yy, zz, xy, yz, xz.
+        values: Flat array of sixteen elements, shape (>= at + 81,); entry k of the matrix is written to ``values[at +
+            16 * k]``.
+        at: Position of its first entry, integer: a multiple of 16 plus the number of the element (0 to 15).
+        m: Matrix, a tuple of six scalars: xx, yy, zz, xy, yz, xz.
     """
     values[at], values[at + LANES], values[at + 2 * LANES] = m[0], m[1], m[2]
     values[at + 3 * LANES], values[at + 4 * LANES], values[at + 5 * LANES] = m[3], m[4], m[5]
@@ -86,7 +88,7 @@ def six_of(values, g, at):
 
     Args:
         values: One row per integration point, shape (m, >= at + 81); entry k is ``values[g, at + 16 * k]``.
-        g: Row, number of the integration point.
+        g: Row, number of the integration point, integer.
         at: Column of the first entry, a multiple of 16 plus the number of the element (0 to 15).
     """
     return (
@@ -105,7 +107,7 @@ def put_six_of(values, g, at, m):
 
     Args:
         values: One row per integration point, shape (m, >= at + 81); entry k is written to ``values[g, at + 16 * k]``.
-        g: Row, number of the integration point.
+        g: Row, number of the integration point, integer.
         at: Column of the first entry, a multiple of 16 plus the number of the element (0 to 15).
         m: Matrix, six scalars: xx, yy, zz, xy, yz, xz.
     """
@@ -118,20 +120,22 @@ def three(values, at):
     """Return a vector of one element among sixteen as three scalars.
 
     Args:
-        values: Flat array of sixteen elements; component k of the vector is ``values[at + 16 * k]``.
-        at: Position of its first component, a multiple of 16 plus the number of the element (0 to 15).
+        values: Flat array of sixteen elements, shape (>= at + 33,); component k of the vector is ``values[at + 16 *
+            k]``.
+        at: Position of its first component, integer: a multiple of 16 plus the number of the element (0 to 15).
     """
     return values[at], values[at + LANES], values[at + 2 * LANES]
 
 
 @njit(**LANE_OPTIONS)
 def put_three(values, at, v):
-    """Write a vector of one element among sixteen.
+    """Write a vector of one element into an array of sixteen elements.
 
     Args:
-        values: Flat array of sixteen elements; component k of the vector is written to ``values[at + 16 * k]``.
-        at: Position of its first component, a multiple of 16 plus the number of the element (0 to 15).
-        v: Vector, three scalars.
+        values: Flat array of sixteen elements, shape (>= at + 33,); component k of the vector is written to ``values[at
+            + 16 * k]``.
+        at: Position of its first component, integer: a multiple of 16 plus the number of the element (0 to 15).
+        v: Vector, a tuple of three scalars.
     """
     values[at], values[at + LANES], values[at + 2 * LANES] = v[0], v[1], v[2]
 
@@ -227,7 +231,12 @@ def cofactor_symmetric(m):
 
 @njit(**LANE_OPTIONS)
 def determinant(m, cofactors):
-    """Return the determinant of a 3 x 3 matrix from its entries and cofactors, nine scalars row by row each."""
+    """Return the determinant of a 3 x 3 matrix, a scalar.
+
+    Args:
+        m: Matrix, nine scalars row by row.
+        cofactors: Its cofactors in the same order, see ``cofactor``, nine scalars.
+    """
     return m[0] * cofactors[0] + m[1] * cofactors[1] + m[2] * cofactors[2]
 
 
@@ -253,7 +262,7 @@ def scatter_lanes(cells, count, source, values):
 
     Args:
         cells: Nodes of the elements, local node by element, shape (k, 16).
-        count: Number of leading elements that are subtracted; the others repeat the last of them.
+        count: Number of leading elements that are subtracted, integer; the others repeat the last of them.
         source: Vectors of the elements, such as forces [N]: component c at local node a of element e at
             ``16 * (3 a + c) + e``, shape (>= 48 k,).
         values: Nodal vectors, shape (n, 3), subtracted from.

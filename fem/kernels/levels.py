@@ -85,13 +85,13 @@ structref.define_proxy(PacedForces, PacedForcesType, ["arrays", "every"])
 
 @njit(cache=True)
 def forces_of(arrays):
-    """Return ``Forces`` from ``ForceArrays`` (kernel arguments of force terms); compiled once, unlike its class."""
+    """Wrap the kernel arguments of all force terms, a ``ForceArrays``, in a ``Forces``, which is passed by pointer."""
     return Forces(*arrays)
 
 
 @njit(cache=True)
 def paced_forces_of(arrays, every):
-    """Return ``PacedForces``; ``arrays``: tuple of three ``Forces``; ``every (3,)``: intervals in steps, 0: unused."""
+    """Return ``PacedForces`` of three ``Forces``, a tuple; ``every (3,)``: steps between actions of each, 0: unused."""
     return PacedForces(arrays, every)
 
 
@@ -184,7 +184,7 @@ def add_forces(arrays, displacement, force):
 
 @njit(cache=True)
 def take_steps(motion, forces, interface, accelerations, step):
-    """Take m steps of central differences as ``ExplicitMotion.advance`` and ``update_force`` do.
+    """Take m steps of central differences, v += dt (f / m + g) and u += dt v, with the forces of a model, in one call.
 
     Args:
         motion: ``StepArrays`` (state, masses and tie of this rank), updated.
@@ -235,7 +235,7 @@ def take_steps(motion, forces, interface, accelerations, step):
 
 @njit(cache=True)
 def count_impulses(interface, substep, force):
-    """Add ``force (n, 3)`` [N] after step ``substep`` (0: at the start) to the impulses of an ``Interface``."""
+    """Add ``force (n, 3)`` [N] after step ``substep`` (0: start), weighted, to both impulses of an ``Interface``."""
     for j in range(2):
         add_impulse(interface.counted, force, interface.weights[substep, j], interface.impulses[j])
 
@@ -309,7 +309,7 @@ def add_paced_forces(motion, forces, substep, pushed, final):
 
 @njit(cache=True)
 def gather_forces(motion, moved, final):
-    """Move forces of the first ``moved`` slaves of ``StepArrays`` to masters; ``final``: store them, move ``ahead``."""
+    """Move forces of the first ``moved`` slave nodes to their masters; if ``final``, store them and move ``ahead``."""
     slave, master, weight = motion.slave[:moved], motion.master[:moved], motion.weight[:moved]
     force = motion.state[2]
     for i in range(moved if final else 0):

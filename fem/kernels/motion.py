@@ -61,7 +61,7 @@ def move(state, mobility, nodes, kicks, steps):
 
 @njit(cache=True)
 def kicks_of(accelerations, step, kicks):
-    """Compute the contributions of a body force to several steps at once, for ``move``.
+    """Compute what a body force adds to velocity and displacement in several steps taken at once, for ``move``.
 
     Args:
         accelerations: Body acceleration as each step begins, shape (k, 3) [m/s^2].
@@ -98,8 +98,8 @@ def work_of_changes(nodes, changes, accelerations, step):
     """Return the work [J] of the varying part of a body force in steps that ``move`` has taken at once.
 
     Args:
-        nodes: Nodal masses in the energy balance (n,) [kg], velocities after the steps (n, 3) [m/s], inverse masses,
-            zero where the velocity is prescribed, (n, 3) [1/kg].
+        nodes: Tuple: nodal masses in the energy balance (n,) [kg], velocities after the steps (n, 3) [m/s], inverse
+            masses, zero where the velocity is prescribed, (n, 3) [1/kg].
         changes: Mean of the varying part in each step, shape (k, 3) [m/s^2].
         accelerations: Whole body acceleration as each step begins, shape (k, 3) [m/s^2].
         step: Time step dt, scalar [s].
@@ -333,14 +333,16 @@ def add_damping(velocity, mobility, frame, coefficients, forces):
 def brake(velocity, forces, nodes, frame, coefficients):
     """Add the drag of a window to the force f, one share, and to the force ahead, all other shares.
 
-    The drag d = -c m (v - v0 + dt/2 ((f + ahead) / m + g)) acts once in a window.
+    A window is several steps in which the drag d = -c m (v - v0 + dt/2 ((f + ahead) / m + g)) acts once.
 
     Args:
-        velocity: ``(n, 3)`` [m/s], v half a step back.
-        forces: ``(n, 3)`` [N] twice: f, and the force ahead, which acts in addition in the coming step.
-        nodes: ``(n, 3)`` inverse mass [1/kg], zero without drag; and ``(n,)`` whether the work on a node counts.
-        frame: ``(2, 3)``: g of the body force [m/s^2], and velocity v0 of the frame in which the drag is zero [m/s].
-        coefficients: c [1/s], dt [s], and number of shares, the steps of a window.
+        velocity: Velocity v half a step back, shape (n, 3) [m/s].
+        forces: Tuple of two arrays (n, 3) [N], both added to: f, and the force ahead, which acts in addition in the
+            coming step.
+        nodes: Tuple: inverse mass (n, 3) [1/kg], zero without drag; and whether the work on a node counts, (n,).
+        frame: Acceleration g of the body force [m/s^2] and velocity v0 of the frame in which the drag is zero [m/s],
+            (2, 3).
+        coefficients: Tuple of scalars: c [1/s], dt [s], and number of shares, the steps of a window.
 
     Returns:
         Sums over the nodes that count: power of the drag in the frame before and after the step [W], and drag [N].

@@ -131,9 +131,10 @@ def add_point(blocks, b, point, path, w):
     """Update stress and state of sixteen elements at one point, and write the nominal stress times volume.
 
     Args:
-        blocks: ``Blocks`` of elements; state and plastic work of the point are updated.
+        blocks: ``Blocks``: all elements in blocks of sixteen, with materials and history; state (stress, plastic
+            strain, strain or stretch) and plastic work of the point are updated.
         b: Number of the block, integer.
-        point: Number of the point in the elements, integer.
+        point: Number of the integration point in the elements, integer.
         path: ``Path``: small or finite kinematics, and the time step of rate-dependent laws [s].
         w: Flat workspace, shape (544,), entry k of element e at ``16 * k + e``; reads the displacement gradients at
             ``DEFORMATION``, writes the nominal stress times volume at ``NOMINAL`` [J], nine entries each.

@@ -29,7 +29,6 @@ from reflowshock.fem.kernels.lanes import (
     LANES,
     add_elastic,
     applied,
-    cross,
     gather_lanes,
     nine,
     put_nine,
@@ -57,14 +56,23 @@ from reflowshock.fem.kernels.nonlinear_modes import (
     write_sums,
     write_trial,
 )
-from reflowshock.fem.kernels.nonlinear_parent import EDGES, places, write_edges, write_fit, write_modes
+from reflowshock.fem.kernels.nonlinear_parent import (
+    EDGES,
+    TRACE,
+    fit_dilatation,
+    write_edges,
+    write_fit,
+    write_forces,
+    write_modes,
+    write_pressures,
+    write_strains,
+)
 from reflowshock.fem.kernels.plastic_lanes import add_work, law_of, plastic_flow
 from reflowshock.materials.plasticity import FIRST_YIELD
 
 CORNERS = 21 * LANES  # entries of positions but for their mean
 MODES = 24 * LANES
 POINT = 7 * LANES  # of the state of a Gauss point: stress, equivalent plastic strain
-TRACE = 6 * LANES  # where a Gauss point has its trace, then its equivalent stress, then its pressure
 
 
 class HexahedronBlocks(NamedTuple):
@@ -103,11 +111,13 @@ class HexahedronBlocks(NamedTuple):
 
 @njit(**LANE_OPTIONS)
 def write_centre(inverse, w):
-    """Write the deformation gradients F at the centres of sixteen elements, nine entries row by row.
+    """Compute the deformation gradients F at the centres of sixteen elements from their displacements.
 
     Args:
-        inverse: Inverse of the transformed positions at rest, entry k of element e at ``16 * k + e``, (144,) [1/m].
-        w: Flat workspace in the same order; reads transformed displacements [m], writes F at ``DEFORMATION``.
+        inverse: Inverse 3 x 3 matrix of the reference positions along x, y and z, entry k (row by row) of element e at
+            ``16 * k + e``, shape (144,) [1/m].
+        w: Flat workspace of ``ALL_SLOTS`` entries; reads the transformed nodal displacements (sums and differences over
+            the corners) in its first 384 entries [m], writes F, nine entries in the same order, at ``DEFORMATION``.
     """
     for lane in range(LANES):
         m, x, y, z = nine(inverse, lane), three(w, X + lane), three(w, Y + lane), three(w, Z + lane)
@@ -130,14 +140,27 @@ def write_centre(inverse, w):
 
 @njit(**LANE_OPTIONS)
 def add_corners(corners, p, w):
-    """Add row ``p`` (integer) of positions at rest, ``corners (np, 336)`` [m], to displacements ``w[X:]`` [m]."""
+    """Add the reference positions of sixteen elements to their displacements, which gives the current positions.
+
+    Args:
+        corners: Reference positions of each element shape: 21 transformed nodal components (sums and differences over
+            the corners, without their mean) of sixteen elements, shape (np, 336) [m].
+        p: Row of ``corners``, integer.
+        w: Flat workspace of ``ALL_SLOTS`` entries; the 336 entries from ``X`` are displacements in the same order [m]
+            on entry, positions [m] on return.
+    """
     for k in range(CORNERS):
         w[X + k] += corners[p, k]
 
 
 @njit(**LANE_OPTIONS)
 def turn_back(w):
-    """Rotate the seven transformed positions x, ``w[X:]`` [m], into the frame R, ``w[ROTATION:]``: x becomes R^T x."""
+    """Rotate the positions of sixteen elements into their corotated frames, in place: x becomes R^T x.
+
+    Args:
+        w: Flat workspace of ``ALL_SLOTS`` entries, entry k of element e at ``16 * k + e``; the seven transformed
+            position vectors x from ``X`` [m] change, the rotation R (nine entries, row by row) at ``ROTATION`` is read.
+    """
     for k in range(X, MODES, 3 * LANES):
         for lane in range(LANES):
             put_three(w, k + lane, applied(transposed(nine(w, ROTATION + lane)), three(w, k + lane)))
@@ -145,7 +168,12 @@ def turn_back(w):
 
 @njit(**LANE_OPTIONS)
 def turn(w):
-    """Rotate the seven transformed forces f, ``w[X:]`` [N], out of the frame R, ``w[ROTATION:]``: f becomes R f."""
+    """Rotate the forces of sixteen elements from their corotated frames back into space, in place: f becomes R f.
+
+    Args:
+        w: Flat workspace of ``ALL_SLOTS`` entries, entry k of element e at ``16 * k + e``; the seven transformed force
+            vectors f from ``X`` [N] change, the rotation R (nine entries, row by row) at ``ROTATION`` is read.
+    """
     for k in range(X, MODES, 3 * LANES):
         for lane in range(LANES):
             put_three(w, k + lane, applied(nine(w, ROTATION + lane), three(w, k + lane)))
@@ -153,54 +181,21 @@ def turn(w):
 
 @njit(**LANE_OPTIONS)
 def move_place(w, place, b):
-    """Write the midpoint and the change of the transformed positions in a step, and store the positions after it.
+    """Compute midpoint and change of the positions of sixteen elements over a step, and store the new positions.
 
-    Positions [m], 21 entries of sixteen elements, are read at ``w[X:]`` (after the step) and in row ``b`` of
-    ``place (nb, 336)`` (before it; replaced). ``w`` is written at ``MIDDLE`` and ``CHANGE``.
+    Args:
+        w: Flat workspace of ``ALL_SLOTS`` entries; reads the 336 transformed positions after the step from ``X`` (21
+            entries of sixteen elements) [m], writes their midpoint from ``MIDDLE + X`` and their change from ``CHANGE +
+            X`` [m].
+        place: Positions of each block before the step, in the same order, shape (nb, 336) [m]; one row is replaced by
+            the positions after the step.
+        b: Row of ``place``, number of the block, integer.
     """
     for k in range(CORNERS):
         new, old = w[X + k], place[b, k]
         w[CHANGE + X + k] = new - old
         w[MIDDLE + X + k] = 0.5 * (new + old)
         place[b, k] = new
-
-
-@njit(**LANE_OPTIONS)
-def write_strains(edges, points):
-    """Write the increments of the compatible strain (engineering shear) and their traces at the Gauss points.
-
-    Args:
-        edges: Derivatives of the midpoint positions, then of their change (by ``write_edges``), shape (1152,) [m].
-        points: Written, shape (8, 112): row of a Gauss point xx, yy, zz, xy, yz, xz, trace, of 16 elements each.
-    """
-    for g in range(8):
-        p, q, r = places(g)
-        for lane in range(LANES):
-            a, b, c = three(edges, p + lane), three(edges, q + lane), three(edges, r + lane)
-            d, e, f = three(edges, EDGES + p + lane), three(edges, EDGES + q + lane), three(edges, EDGES + r + lane)
-            u, v, t = cross(b, c), cross(c, a), cross(a, b)
-            s = 1.0 / (a[0] * u[0] + a[1] * u[1] + a[2] * u[2])
-            xx = s * (d[0] * u[0] + e[0] * v[0] + f[0] * t[0])
-            yy = s * (d[1] * u[1] + e[1] * v[1] + f[1] * t[1])
-            zz = s * (d[2] * u[2] + e[2] * v[2] + f[2] * t[2])
-            xy = d[0] * u[1] + e[0] * v[1] + f[0] * t[1] + d[1] * u[0] + e[1] * v[0] + f[1] * t[0]
-            yz = d[1] * u[2] + e[1] * v[2] + f[1] * t[2] + d[2] * u[1] + e[2] * v[1] + f[2] * t[1]
-            xz = d[0] * u[2] + e[0] * v[2] + f[0] * t[2] + d[2] * u[0] + e[2] * v[0] + f[2] * t[0]
-            row = points[g]
-            row[lane], row[LANES + lane], row[2 * LANES + lane] = xx, yy, zz
-            row[3 * LANES + lane], row[4 * LANES + lane], row[5 * LANES + lane] = s * xy, s * yz, s * xz
-            row[TRACE + lane] = xx + yy + zz
-
-
-@njit(**LANE_OPTIONS)
-def fit_dilatation(points, fitted):
-    """Change normal strains of ``points (8, 112)`` so that their traces become the linear fits ``fitted (128,)``."""
-    for g in range(8):
-        for lane in range(LANES):
-            third = (fitted[LANES * g + lane] - points[g, TRACE + lane]) / 3.0
-            points[g, lane] += third
-            points[g, LANES + lane] += third
-            points[g, 2 * LANES + lane] += third
 
 
 @njit(**LANE_OPTIONS)
@@ -254,10 +249,16 @@ def count_yielding(points, limit):
 
 @njit(cache=True)
 def flow(blocks, b, points, step, w):
-    """Return the stresses of block ``b`` of ``HexahedronBlocks`` to the yield surface, and add the plastic work.
+    """Return the stresses of a block of sixteen elements to the yield surface, and add the plastic work.
 
-    ``points (8, 112)`` has six strain increments and the squared von Mises stress [Pa^2] of 16 elements at each Gauss
-    point; ``b`` is an integer, ``step`` the time step, a scalar [s]; ``w (544,)`` is a workspace, overwritten.
+    Args:
+        blocks: ``HexahedronBlocks``: all elements in blocks of sixteen; stresses, plastic strains and plastic work of
+            the block are updated.
+        b: Number of the block, integer.
+        points: One row per Gauss point, shape (8, 112): six strain increments and the squared von Mises stress [Pa^2],
+            entry k of element e in column ``16 * k + e``.
+        step: Time step of rate-dependent laws, scalar [s].
+        w: Workspace of shape (544,), overwritten.
     """
     state, weight, work = blocks.state[b], blocks.weight[blocks.pattern[b]], blocks.plastic_work[b]
     law = law_of(blocks.plastic, blocks.material[b], step)
@@ -271,59 +272,30 @@ def flow(blocks, b, points, step, w):
 
 
 @njit(**LANE_OPTIONS)
-def write_pressures(state, points):
-    """Write mean stresses (tension > 0) [Pa] of ``state (8, 112)`` to the last 16 columns of ``points (8, 112)``."""
-    for g in range(8):
-        for lane in range(LANES):
-            points[g, TRACE + lane] = (state[g, lane] + state[g, LANES + lane] + state[g, 2 * LANES + lane]) / 3.0
-
-
-@njit(**LANE_OPTIONS)
-def write_forces(edges, load, forces):
-    """Write the forces on the derivatives of x^ at the Gauss points of sixteen elements.
+def copy_corners(source, b, w, at):
+    """Copy the transformed positions of sixteen elements into the workspace.
 
     Args:
-        edges: Derivatives of the positions after the step, as ``write_edges`` writes them, shape (>= 576,) [m].
-        load: State (8, 112), mean stresses in the last 16 columns of (8, 112) [Pa], fit (128,), volumes (8, 16) [m^3].
-        forces: Written, (8, 144) [J/m]: component c along direction d of element e in column ``16 * (3 d + c) + e``.
-
-    Returns:
-        Number of Gauss points of all elements that are turned inside out, as a float.
+        source: Transformed positions of several blocks or shapes, 21 entries of sixteen elements each, shape (nb, 336)
+            [m].
+        b: Row of ``source`` that is copied, integer.
+        w: Flat workspace of ``ALL_SLOTS`` entries; the 336 entries from ``at + X`` are overwritten.
+        at: Start of the positions in ``w``, such as ``MIDDLE`` (positions in the middle of the step), integer.
     """
-    state, points, fitted, weight = load
-    wrong = 0.0
-    for g in range(8):
-        p, q, r = places(g)
-        for lane in range(LANES):
-            a, b, c = three(edges, p + lane), three(edges, q + lane), three(edges, r + lane)
-            u, v, t = cross(b, c), cross(c, a), cross(a, b)
-            volume = a[0] * u[0] + a[1] * u[1] + a[2] * u[2]
-            wrong += 0.0 if volume < 0.0 else 1.0
-            f, m = weight[g, lane] / volume, six_of(state, g, lane)
-            shift = fitted[LANES * g + lane] - points[g, TRACE + lane]
-            s = (f * (m[0] + shift), f * (m[1] + shift), f * (m[2] + shift), f * m[3], f * m[4], f * m[5])
-            forces[g, lane] = s[0] * u[0] + s[3] * u[1] + s[5] * u[2]
-            forces[g, LANES + lane] = s[3] * u[0] + s[1] * u[1] + s[4] * u[2]
-            forces[g, 2 * LANES + lane] = s[5] * u[0] + s[4] * u[1] + s[2] * u[2]
-            forces[g, 3 * LANES + lane] = s[0] * v[0] + s[3] * v[1] + s[5] * v[2]
-            forces[g, 4 * LANES + lane] = s[3] * v[0] + s[1] * v[1] + s[4] * v[2]
-            forces[g, 5 * LANES + lane] = s[5] * v[0] + s[4] * v[1] + s[2] * v[2]
-            forces[g, 6 * LANES + lane] = s[0] * t[0] + s[3] * t[1] + s[5] * t[2]
-            forces[g, 7 * LANES + lane] = s[3] * t[0] + s[1] * t[1] + s[4] * t[2]
-            forces[g, 8 * LANES + lane] = s[5] * t[0] + s[4] * t[1] + s[2] * t[2]
-    return wrong
-
-
-@njit(**LANE_OPTIONS)
-def copy_corners(source, b, w, at):
-    """Copy row ``b`` (integer) of transformed positions ``source (nb, 336)`` [m] to ``w[at + X:]``, w flat."""
     for k in range(CORNERS):
         w[at + X + k] = source[b, k]
 
 
 @njit(**LANE_OPTIONS)
 def constants_of(elastic, m):
-    """Return row ``m`` (integer) of ``elastic (nm, 9)`` [Pa] as nine scalars C_xx yy zz xy yz xz, G_xy yz xz."""
+    """Return the elastic constants of a material as nine scalars [Pa].
+
+    They are C_xx, C_yy, C_zz, C_xy, C_yz, C_xz (normal strains) and the shear moduli G_xy, G_yz, G_xz.
+
+    Args:
+        elastic: The same constants of each material in its rows, shape (nm, 9) [Pa].
+        m: Index of the material, integer.
+    """
     return (
         elastic[m, 0],
         elastic[m, 1],
@@ -342,13 +314,15 @@ def add_hexahedron_force(blocks, path, displacement, force):
     """Subtract the internal force of hexahedra with incompatible modes, and advance their state by a step.
 
     Args:
-        blocks: ``HexahedronBlocks``; state, positions, work and energy are updated.
+        blocks: ``HexahedronBlocks``: the elements in blocks of sixteen; stresses, plastic strains, positions, plastic
+            work and hourglass energy are updated.
         path: ``Path``: small or finite kinematics, and the time step of rate-dependent laws [s].
         displacement: Nodal displacement after the step, shape (n, 3) [m].
         force: Nodal force, shape (n, 3) [N], subtracted from.
 
     Returns:
-        ``FINE`` (-1), or the first block with an element turned inside out; then the force is not complete.
+        ``FINE`` (-1), or the number of the first block with an element turned inside out; then the force is not
+        complete.
     """
     w, edges, point = np.zeros(ALL_SLOTS), np.empty(2 * EDGES), np.empty(WORK_SLOTS)
     points, forces, fitted = np.empty((8, POINT)), np.empty((8, 9 * LANES)), np.empty(8 * LANES)

@@ -36,8 +36,9 @@ def write_normals(w):
     """Write n_k, the gradients of the parent coordinates at the centres of sixteen hexahedra in the middle of the step.
 
     Args:
-        w: Flat workspace of ``ALL_SLOTS`` entries, entry k of element e at ``16 * k + e``; reads transformed positions
-            at ``MIDDLE`` [m], writes the three vectors n_1, n_2, n_3 at ``NORMAL``.
+        w: Flat workspace of ``ALL_SLOTS`` entries, entry k of element e at ``16 * k + e``; reads the transformed
+            positions (sums and differences over the corners) in the middle of the step at ``MIDDLE`` [m], writes the
+            three vectors n_1, n_2, n_3 at ``NORMAL``.
     """
     for lane in range(LANES):
         a, b, c = three(w, MIDDLE + X + lane), three(w, MIDDLE + Y + lane), three(w, MIDDLE + Z + lane)
@@ -54,12 +55,15 @@ def write_normals(w):
 def write_sums(values, w, at):
     """Write the sums of xi_k s, k = 1 to 3, over the Gauss points of sixteen hexahedra, for six scalars s per point.
 
+    xi_k are the parent coordinates of the Gauss points, from -1 to 1.
+
     Args:
         values: Stresses or strain increments of each Gauss point, entry i of element e in column ``16 * i + e``, shape
             (8, >= 96).
-        w: Flat workspace, of which 288 entries are written: the sum of entry i for xi_k of element e at
-            ``at + 16 * (6 (k - 1) + i) + e``.
-        at: Position of the first sum in ``w``, integer: ``BEFORE`` or ``AFTER`` for stresses, ``SUMS`` for strains.
+        w: Flat workspace, of which 288 entries are written: the sum of entry i for xi_k of element e at ``at + 16 * (6
+            (k - 1) + i) + e``.
+        at: Position of the first sum in ``w``, integer: ``BEFORE`` or ``AFTER`` for stresses before or after the step,
+            ``SUMS`` for strains.
     """
     for i in range(6 * LANES):
         a, b, c, d = values[0, i], values[1, i], values[2, i], values[3, i]
@@ -73,7 +77,9 @@ def write_sums(values, w, at):
 def write_trial(w, elastic):
     """Write the forces on the modes of sixteen hexahedra after an elastic step with modes at rest: (S_k + C T_k) n_k.
 
-    S and T are the sums over the Gauss points of the stresses before the step and of the strain increments.
+    For the mode k = 1 to 3, S_k and T_k are the sums of xi_k s over the Gauss points for the stresses s before the step
+    and for the strain increments of the step, n_k is the gradient of the parent coordinate xi_k at the centre, C the
+    elasticity.
 
     Args:
         w: Flat workspace of ``ALL_SLOTS`` entries, entry k of element e at ``16 * k + e``; reads S_k at ``BEFORE``, T_k
@@ -113,9 +119,12 @@ def strain_of(a, n):
 def add_remainder(w, energy):
     """Subtract the work of the residual forces on the modes in a step from the hourglass energy of sixteen hexahedra.
 
+    Each element has three incompatible modes, to which belong six sums of stresses and six strains each.
+
     Args:
-        w: Flat workspace of ``ALL_SLOTS`` entries, entry k of element e at ``16 * k + e``: sums of the stresses before
-            and after the step at ``BEFORE`` and ``AFTER`` [Pa], strains of the modes at ``SUMS``, 18 entries each.
+        w: Flat workspace of ``ALL_SLOTS`` entries, entry k of element e at ``16 * k + e``; reads, 18 entries each, the
+            sums of the stresses over the Gauss points before and after the step at ``BEFORE`` and ``AFTER`` [Pa], and
+            the strains of the modes at ``SUMS``.
         energy: Hourglass energy, shape (16,) [J], updated.
     """
     for lane in range(LANES):
@@ -179,7 +188,7 @@ def inverse(m):
 
 @njit(**LANE_OPTIONS)
 def minus(m, n):
-    """Return m - n for two 3 x 3 matrices of nine scalars each."""
+    """Return m - n for two 3 x 3 matrices; all three are nine scalars, row by row."""
     return (
         m[0] - n[0], m[1] - n[1], m[2] - n[2], m[3] - n[3], m[4] - n[4],
         m[5] - n[5], m[6] - n[6], m[7] - n[7], m[8] - n[8],
@@ -188,7 +197,7 @@ def minus(m, n):
 
 @njit(**LANE_OPTIONS)
 def less(v, m, u):
-    """Return v - m u as three scalars; m is a 3 x 3 matrix (nine scalars, row by row), v and u are vectors."""
+    """Return v - m u as three scalars; m: 3 x 3 matrix, nine scalars row by row; v and u: vectors of three scalars."""
     p = applied(m, u)
     return v[0] - p[0], v[1] - p[1], v[2] - p[2]
 

@@ -152,7 +152,15 @@ class WindowDrag(Load):
 
 
 def mobility_without_table(motion: Loaded) -> NDArray[np.float64]:
-    """Return the mobility of a motion, shape (n, 3) [1/kg], zero at the nodes of a large mass."""
+    """Return the inverse nodal masses of a motion, zero at nodes of a large mass, which represents the drop table.
+
+    Args:
+        motion: Motion with its ``mobility`` (inverse mass, zero where the velocity is prescribed) and the nodes that
+            carry a large mass.
+
+    Returns:
+        Inverse mass of each node and component, shape (n, 3) [1/kg]; not a copy if no node carries one.
+    """
     if not len(motion.carried):
         return motion.mobility
     mobility = motion.mobility.copy()

@@ -40,6 +40,9 @@ def shock_loads(comm: MPI.Comm, mass: float, body: Body, tables: JointTables, sh
         body: Model on this rank.
         tables: Tables of the model, with its support nodes.
         shock: Parameters of the shock.
+
+    Returns:
+        Gravity if it acts, body acceleration or large mass that drives the model, and damping if the shock has any.
     """
     pulse = shock_pulse(shock)
     loads: list[Load] = [BodyAcceleration(DOWN, Constant(STANDARD_GRAVITY))] if pulse.gravity["on"] else []

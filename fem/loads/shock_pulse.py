@@ -31,6 +31,9 @@ def shock_pulse(shock: Shock) -> ShockPulse:
     Args:
         shock: Parameters of the shock: a table file, a JEDEC service condition, or peak and duration of a half sine.
 
+    Returns:
+        Pulse as a function of time, text on its source, and whether gravity acts during the shock, with the reason.
+
     Raises:
         PulseError: The table of the pulse cannot be read.
         ValueError: The shock has none of the three.

@@ -32,7 +32,12 @@ def _quadrilateral() -> FacetRule:
 
 
 def triangle() -> FacetRule:
-    """Return the one-point (centroid) quadrature rule of a linear triangle, for shape functions of its three nodes."""
+    """Return the one-point (centroid) quadrature rule of a linear triangle, for shape functions of its three nodes.
+
+    Returns:
+        Shape functions at the point, shape (1, 3), their derivatives, shape (1, 3, 2), and the weight of the point,
+        shape (1,).
+    """
     return FacetRule(np.full((1, 3), 1.0 / 3.0), BARYCENTRIC[None], np.full(1, 0.5))
 
 

@@ -61,6 +61,9 @@ def outward_facets(mesh: MeshData, name: str) -> OutwardFacets:
         mesh: Mesh with the facet set.
         name: Name of the facet set.
 
+    Returns:
+        Nodes of the facets, shape (nf, m); cell of each facet, shape (nf,); and +1 or -1 for each facet, shape (nf,).
+
     Raises:
         LoadError: The set does not exist or is empty, or one of its facets belongs to no cell.
     """

@@ -64,12 +64,17 @@ class PadFaces:
 
 
 def pad_faces(mesh: MeshData, joints: tuple[str, ...], solder: list[NDArray[np.intp]]) -> PadFaces:
-    """Return the pad faces of joints.
+    """Return the pad faces of joints, at which solder meets the pads of board and package.
 
     Args:
         mesh: Whole mesh.
         joints: Names of the joints.
-        solder: Numbers of the solder elements of each joint, one array per joint in the order of ``joints``.
+        solder: Numbers of the solder elements of each joint, one array of shape (s,) per joint in the order of
+            ``joints``.
+
+    Returns:
+        Faces at the board and package end of each joint: nodes, facets with their solder elements, centroids [m],
+        orthonormal frames, areas [m^2] and section moduli [m^3].
 
     Raises:
         MeshError: A facet of a pad belongs to no solder element of its joint, or a pad has no facet.

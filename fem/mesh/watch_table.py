@@ -106,6 +106,10 @@ def whole_watch(mesh: MeshData, thickness: float) -> WatchTable:
         mesh: Whole mesh of board, package and joints.
         thickness: Thickness of the layers at the pads over which stress and plastic flow are averaged [m].
 
+    Returns:
+        Names of the joints; nodes at the centres of board and die; pad faces; solder layers at the pads; facets of the
+        board under the package, where its strain is recorded. All numbers are numbers of the mesh.
+
     Raises:
         MeshError: A pad of a joint has no solder element, or the layer is thicker than a joint.
     """

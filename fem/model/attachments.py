@@ -22,6 +22,9 @@ def beddings_of(local: LocalMesh, table: FittedTable, supports: Mapping[str, Sup
         local: Mesh of this rank.
         table: ``FittedTable`` with the facets of each elastic support by name, equal on all ranks.
         supports: Support of the case file by name; must contain the names in the table.
+
+    Returns:
+        Force terms with the stiffness per area, cells and nodes of their facets; a list in the order of the table.
     """
     return [BeddedFacets.build(name, local, facets, supports[name].stiffness) for name, facets in table.bedded.items()]
 

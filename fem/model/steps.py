@@ -100,6 +100,9 @@ def single_model_steps(steps: Steps, critical: float, rules: Rules) -> Steps:
         steps: Steps of the divided model.
         critical: Undamped critical step of the undivided model [s].
         rules: Settings of the division: step over critical step, and damping.
+
+    Returns:
+        Windows with the substeps that the undivided model needs, critical steps [s] and masses [kg].
     """
     smallest = damped_critical_step(critical, rules.stiffness)
     substeps = math.ceil(steps.plan.window / (rules.fraction * smallest))
@@ -133,11 +136,14 @@ def assembled_step(
 
 
 def find_minimum(world: MPI.Comm, values: Sequence[NDArray[np.float64]]) -> float:
-    """Return the smallest of all values of all arrays on all ranks, infinity if there are none; collective.
+    """Return the smallest of all values of all arrays on all ranks, in their unit, such as critical steps; collective.
 
     Args:
         world: Communicator of all ranks that take part.
         values: Arrays of this rank, of any shape; at least one, which may be empty.
+
+    Returns:
+        Minimum, equal on all ranks; infinity if all arrays of all ranks are empty.
     """
     return float(world.allreduce(min(float(array.min(initial=np.inf)) for array in values), MPI.MIN))
 
@@ -215,6 +221,9 @@ def with_critical(steps: Steps, undamped: float, dynamics: Dynamics) -> Steps:
         steps: Steps of a single model.
         undamped: Critical step without damping [s].
         dynamics: Settings of the dynamics.
+
+    Returns:
+        Windows and substeps, critical steps [s] and masses [kg].
     """
     plan, critical = _explicit_plan(dynamics, undamped)
     return replace(steps, plan=plan, macro_critical=critical, smallest=critical)
@@ -228,6 +237,9 @@ def implicit_steps(comm: MPI.Comm, rank_elements: RankElements, dynamics: Dynami
         rank_elements: Elements of this rank; their critical steps are only reported.
         dynamics: Settings of the dynamics, which may contain the step.
         pulses: Durations of the load pulses [s]; the shortest sets the step if the input has none.
+
+    Returns:
+        Windows and substeps, critical steps of the elements [s] and masses [kg].
     """
     critical, plan = find_minimum(comm, [rank_elements.steps]), window_plan(dynamics, implicit_step(dynamics, pulses))
     return _make_steps(comm, rank_elements, np.ones(len(rank_elements.steps)), plan, critical)
@@ -241,6 +253,9 @@ def window_plan(dynamics: Dynamics, largest: float) -> WindowPlan:
     Args:
         dynamics: Settings of the dynamics: duration and number of history samples.
         largest: Largest step [s].
+
+    Returns:
+        Window [s], steps per window, number of windows, and windows from one history sample to the next.
     """
     samples = min(dynamics.numerics.history_samples, _round_up(dynamics.duration / largest))
     stride = _round_up(dynamics.duration / samples / largest / LONGEST_WINDOW)

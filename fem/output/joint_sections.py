@@ -118,11 +118,12 @@ def _sum_by_slot(slot: NDArray[np.int64], values: NDArray[np.float64], count: in
 
 
 def section_values(sums: NDArray[np.float64], faces: PadFaces) -> dict[str, NDArray[np.float64]]:
-    """Return the history values of a sample from the sums of ``JointSections`` over all ranks.
+    """Compute section forces, moments and stresses of all joints in a sample from the sums of ``JointSections``.
 
     Args:
-        sums: Sums over all ranks of one sample, as returned by ``JointSections``.
-        faces: Pad faces of all joints.
+        sums: Result of ``JointSections.sums``, added over all ranks, shape (33 joints,): forces and moments on the pad
+            faces [N, N m], shapes of the deformed faces, and inertia of the joints.
+        faces: Pad faces of all joints: centroids, frames, areas and section moduli at rest.
 
     Returns:
         For the ends ``board`` and ``package``: ``section_<end>``, axial force, two shear forces [N], torsion and two

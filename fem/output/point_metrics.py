@@ -18,13 +18,14 @@ def point_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
     """Return the peaks at watch points and supports as metrics, each as ``{"value": ..., "unit": ...}``.
 
     Args:
-        arrays: Arrays of ``history.npz`` by name, with the histories of watch points and supports; empty result without
-            any.
+        arrays: Arrays of ``history.npz``: ``watch`` and ``supports`` (names); ``displacement@<name>``, shape (k, 3)
+            [m], ``strain@<name>`` and ``stress@<name>`` [Pa], shape (k, 6), of each watch point; ``reaction@<name>``,
+            shape (k, 3) [N], of each support.
 
     Returns:
         For each watch point ``peak_displacement@<name>``, ``displacement_range@<name>`` [m], ``peak_strain@<name>``,
         ``peak_von_mises@<name>`` [Pa] and, with plasticity, ``peak_plastic_strain@<name>``; for each support
-        ``peak_reaction@<name>`` [N].
+        ``peak_reaction@<name>`` [N]. Empty without watch points and supports.
     """
     metrics: dict[str, Any] = {}
     for name in arrays["watch"]:

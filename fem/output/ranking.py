@@ -50,11 +50,16 @@ PLASTIC_FLOW = {"layer_plastic_strain": PLASTIC_STRAIN, "layer_plastic_work": PL
 
 
 def joint_figures(arrays: Arrays, joint: int) -> dict[str, tuple[float, str]]:
-    """Return the peaks over time on the worse pad of a joint: name -> value and SI unit.
+    """Return the peaks over time of stresses and section forces on the worse pad of a joint.
 
     Args:
-        arrays: Histories of a shock.
-        joint: Number of the joint.
+        arrays: Arrays of ``history.npz`` of a shock, with one column per joint.
+        joint: Column of the joint.
+
+    Returns:
+        Name -> value and SI unit: ``peel_stress``, ``layer_von_mises``, ``outer_fibre_stress`` [Pa], plastic strain and
+        work density if solder may yield, ``section_axial_force``, ``section_shear_force`` [N],
+        ``section_torsion_moment`` and ``section_bending_moment`` [N m].
     """
     sections = np.stack([arrays[f"section_{end}"][:, joint] for end in ENDS])
     flows = PLASTIC_FLOW if "plastic_strain_max" in arrays else {}

@@ -24,13 +24,16 @@ SMALL = 0.1  # fraction of the largest deflection below which a zero crossing do
 def is_settled(history: Arrays, damped: bool = False) -> bool:
     """Return whether the largest stress of all joints has passed, and enough swings of the board after it.
 
-    Then a run may end early. Half an oscillation, a swing, is the time from the start to the first zero crossing of the
-    board centre. It is at least half the period of the first mode, since it includes the pulse.
+    Then a run may end early: half an oscillation after the largest stress, and, if the board is damped, when stresses
+    in the two latest swings are at most 0.9 times the largest. A swing, half an oscillation, is the time from the start
+    to the first zero crossing of the board centre. It is at least half the period of the first mode, since it includes
+    the pulse.
 
     Args:
-        history: Arrays named in ``WATCHED``: ``time``, shape (k,) [s], ``board_centre``, shape (k, 3) [m], and for the
-            ends ``board`` and ``package`` the stresses, shape (k, joints) [Pa], and plastic work of the joints.
-        damped: Whether the board is damped; then the two latest swings must have decayed.
+        history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``board_centre``, shape (k, 3) [m], and for the
+            ends ``board`` and ``package`` the stresses, shape (k, joints) [Pa], and plastic work of the joints if
+            solder may yield.
+        damped: Whether the board is damped.
     """
     end = needed_end(history)
     if end is None or history["time"][-1] < end:
@@ -39,7 +42,15 @@ def is_settled(history: Arrays, damped: bool = False) -> bool:
 
 
 def needed_end(history: Arrays) -> float | None:
-    """Return the time half an oscillation after the largest stress [s], None before the board first returns."""
+    """Return the time half an oscillation of the board after the largest joint stress [s], when a run may end early.
+
+    Args:
+        history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``board_centre``, shape (k, 3) [m], and stresses
+            of the joints at the ends ``board`` and ``package``, shape (k, joints) [Pa].
+
+    Returns:
+        Time [s]; None before the board has first returned to its position at the start, or without joints.
+    """
     time, half = history["time"], half_oscillation(history["time"], history["board_centre"][:, 2])
     if half is None or not PEEL.worse(history).size:
         return None
@@ -47,7 +58,15 @@ def needed_end(history: Arrays) -> float | None:
 
 
 def latest_swings(history: Arrays) -> float:
-    """Return the largest stress in the two latest swings over the largest of all; one if it is in them."""
+    """Return the largest joint stress in the two latest swings (half oscillations of the board) over its maximum.
+
+    Args:
+        history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``board_centre``, shape (k, 3) [m], and stresses
+            of the joints at the ends ``board`` and ``package``, shape (k, joints) [Pa].
+
+    Returns:
+        Ratio from 0 to 1, the largest over the measures of stress; 1 also before the board has first returned.
+    """
     time, half = history["time"], half_oscillation(history["time"], history["board_centre"][:, 2])
     if half is None:
         return 1.0
@@ -64,6 +83,9 @@ def settling_measures(history: Arrays) -> tuple[Measure, ...]:
     Args:
         history: Arrays of ``history.npz``: ``peel_<end>`` [Pa] and, with plasticity, ``plastic_work_<end>`` for the
             ends ``board`` and ``package``, each of shape (times, joints).
+
+    Returns:
+        Measures whose methods return histories and peaks on the worse pad from such arrays.
     """
     return (PEEL,) if ranking_measure(history) is PLASTIC_WORK else (PEEL, VON_MISES)
 

@@ -76,6 +76,9 @@ def find_checkpoints(folder: Path, owner: str, preferred: Path) -> list[Checkpoi
         folder: Folder with one subfolder for each input and partition.
         owner: Digest of the inputs to which a checkpoint must belong.
         preferred: Subfolder of the current partition.
+
+    Returns:
+        Records with folder, window, time [s], number of ranks, and whether the partition is the current one.
     """
     by_checkpoint: dict[tuple[Path, int, int], dict[int, Header]] = {}
     for path in sorted(folder.glob("*/state-*")):
@@ -98,6 +101,9 @@ def header_of(path: Path) -> Header | None:
 
     Args:
         path: File to be read.
+
+    Returns:
+        Digest of the inputs, number of ranks, window and time [s]; None if the file is no checkpoint.
     """
     try:
         return Header(**read_header(path))
@@ -123,7 +129,7 @@ def write_state(path: Path, header: Header, state: object) -> None:
 
 
 def digest_of(content: bytes) -> str:
-    """Return the hexadecimal SHA-256 digest of some bytes."""
+    """Return the SHA-256 digest of some bytes as hexadecimal text."""
     return hashlib.sha256(content).hexdigest()
 
 

@@ -187,10 +187,13 @@ def layout(state: State) -> str:
 def take(state: State, part: State, first: Collection[str]) -> None:
     """Merge the state of one rank of another partition into the state of this rank.
 
+    A checkpoint can thus be continued on another number of ranks: each rank takes the states of all former ranks in
+    turn, values at nodes and cells by their numbers, sums over ranks by addition.
+
     Args:
         state: State of this rank, nested dictionaries of entries created by ``blank``; changed in place.
         part: State of the other rank; missing names are skipped.
-        first: Names in ``state`` that no lower rank has.
+        first: Names in ``state`` that no lower rank has, so that this rank takes the sums.
     """
     for name in state.keys() & part.keys():
         _merge(state[name], part[name], name in first)

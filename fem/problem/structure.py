@@ -144,11 +144,12 @@ class LayerCoupling(Coupling):
 
 
 def fine_layers(coupling: LayerCoupling, steps: Mapping[str, float]) -> tuple[str, ...]:
-    """Return the names of the fine layers, which form the meso model.
+    """Return the names of the fine layers, which form the meso model, in their order.
 
     Args:
-        coupling: Coupling settings, which may name the layers.
-        steps: Layer name -> critical step [s].
+        coupling: Coupling settings; if they name fine layers, these are returned.
+        steps: Layer name -> critical step [s]; if no layers are named, those below half the largest critical step are
+            fine.
     """
     return coupling.fine or tuple(name for name, step in steps.items() if step < FINE_STEP * max(steps.values()))
 

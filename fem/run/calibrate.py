@@ -27,7 +27,12 @@ FAMILIES = {
 
 
 def slowness() -> dict[str, float]:
-    """Return the time of an element update on this machine over that of the reference machine, by element family."""
+    """Measure the time of an element update on this machine over the time on the reference machine; takes seconds.
+
+    Returns:
+        Element family -> ratio, above one on a slower machine, with the families ``turning_box`` (corotational boxes),
+        ``turning`` (other corotational hexahedra) and ``path`` (path-dependent elements).
+    """
     rounds = [
         {family: _seconds(material, skew) * rate for family, (material, skew, rate) in FAMILIES.items()}
         for _ in range(ROUNDS)

@@ -91,6 +91,9 @@ def add_pins(item: ModelInput[JointTables]) -> ModelInput[JointTables]:
 
     Args:
         item: Mesh and tables of one model before distribution; its mesh is unchanged.
+
+    Returns:
+        The same mesh with tables that have more fixed components.
     """
     tables = item.tables
     held, usable = np.zeros((tables.nodes, 3), dtype=bool), np.zeros(tables.nodes, dtype=bool)

@@ -69,6 +69,9 @@ def treatment_of(request: RunInput | StructureInput, mass_scaled_step: float | N
     Args:
         request: Input of the run.
         mass_scaled_step: Largest critical step after mass scaling [s]; None sets no limit.
+
+    Returns:
+        Formulation of hexahedra, kinematics, material roles with mass scaling, and largest step after mass scaling [s].
     """
     numerics = request.numerics
     return Treatment(request.formulation, request.kinematics, numerics.mass_scaled, mass_scaled_step or np.inf)

@@ -48,12 +48,13 @@ class Equilibrium:
 def thermal_force(
     body: Body, chosen: NDArray[np.bool_] | slice, materials: Sequence[Material], change: float
 ) -> NDArray[np.float64]:
-    """Return the nodal forces of suppressed thermal expansion of selected elements, shape (n, 3) [N].
+    """Return the nodal forces of selected elements whose thermal expansion is suppressed, shape (n, 3) [N].
 
-    All elements pass the patch test, so their mean gradients are exact for a constant stress.
+    They push outwards when the temperature rises: without constraints they cause the free expansion. All elements pass
+    the patch test, so their mean gradients are exact for a constant stress.
 
     Args:
-        body: Model on this rank.
+        body: Model on this rank, n nodes.
         chosen: Selected elements, shape (ne,), or a slice.
         materials: Material of each index of ``body.elements``.
         change: Temperature change [K].

@@ -106,6 +106,9 @@ def thermal_tables(mesh: MeshData, centre: NDArray[np.float64]) -> ThermalTables
         mesh: Mesh of board and package.
         centre: Centre of the package's rotations, shape (3,) [m].
 
+    Returns:
+        Tables with fixed components and pins, mask of the package's nodes, and free rigid-body motions of both bodies.
+
     Raises:
         MeshError: Board or package is missing, or they share nodes.
     """
@@ -149,7 +152,12 @@ def _find_resting_nodes(mesh: MeshData) -> NDArray[np.intp]:
 
 
 def find_die_corners(mesh: MeshData) -> NDArray[np.intp]:
-    """Return the nodes at the upper die corners that no symmetry plane removes, shape (k,); one in a quarter model.
+    """Return the nodes at the upper corners of the die, without corners that a symmetry plane removes, shape (k,).
+
+    There are four in a whole model, two in a half and one in a quarter model.
+
+    Args:
+        mesh: Mesh of board and package.
 
     Raises:
         MeshError: The mesh has no die.

@@ -275,7 +275,14 @@ def _failed(runner: StudyRunner) -> list[str]:
 
 
 def remark_unverified(accuracy: Accuracy) -> list[str]:
-    """Return one remark if the recommended settings were not run successfully, otherwise an empty list."""
+    """Return a remark if the recommended settings were not run, so that their error is predicted only.
+
+    Args:
+        accuracy: Convergence study with its recommendation.
+
+    Returns:
+        List with one sentence, which gives the reason; empty if they were run successfully.
+    """
     chosen = accuracy.recommended
     if chosen is None or tables.prediction(accuracy) is not None:
         return []
@@ -344,5 +351,8 @@ def table(texts: dict, title: str) -> Table:
     Args:
         texts: Table with ``head`` (column titles) and ``rows`` (lists of text).
         title: Title of the table.
+
+    Returns:
+        Table of rich with the same columns and rows.
     """
     return text_table(f"\n{title}" if title else "", texts["head"], texts["rows"], remarks=texts.get("prose", False))

@@ -38,12 +38,24 @@ TAG_KEYS = ("kind", "method")  # keys whose value selects the model of a table
 
 
 def holds_named_tables(field: FieldInfo) -> bool:
-    """Return whether a field is a table of tables with user-defined names, such as a structure's layers."""
+    """Return whether a field is a table of tables with user-defined names, such as a structure's layers.
+
+    Args:
+        field: Field of a parameter model (pydantic).
+    """
     return typing.get_origin(field.annotation) is dict
 
 
 def models_of(field: FieldInfo) -> tuple[type[BaseModel], ...]:
-    """Return the parameter models that a field's table, or each of its named tables, may follow; empty for values."""
+    """Return the parameter models (pydantic) that may describe the table of a field.
+
+    Args:
+        field: Field of a parameter model; for a table of tables with user-defined names, its models describe these
+            tables.
+
+    Returns:
+        Models, several if the table has kinds; empty if the field is a value.
+    """
     annotation = typing.get_args(field.annotation)[1] if holds_named_tables(field) else field.annotation
     annotation = _bare(annotation)
     members = typing.get_args(annotation) if _is_union(annotation) else (annotation,)
@@ -79,16 +91,27 @@ def tag_of(model: type[BaseModel]) -> str:
 
 
 def alternatives(field: FieldInfo) -> tuple[FieldInfo, ...]:
-    """Return one field per kind of value, such as a name or a number; the field itself if there is only one."""
+    """Split a field that allows several types of value, such as a name or a number, into one field for each type.
+
+    Args:
+        field: Field of a parameter model (pydantic).
+
+    Returns:
+        One field per type, without None; the field itself if there is only one type.
+    """
     members = typing.get_args(field.annotation) if _is_union(field.annotation) and not models_of(field) else ()
     values = [member for member in members if member is not types.NoneType]
     return tuple(map(FieldInfo.from_annotation, values)) if len(values) > 1 else (field,)
 
 
 def allowed(field: FieldInfo) -> str:
-    """Describe the allowed values of a field as text: names, or a range in the user's unit; empty without a limit.
+    """Describe the allowed values of a field as text, for messages: names, or a range in the user's unit.
 
-    A quantity without bounds gives ``any`` and its kind.
+    Args:
+        field: Field of a parameter model (pydantic).
+
+    Returns:
+        Text; ``any`` and the kind of quantity without bounds, and empty for other fields without a limit.
     """
     kinds = alternatives(field)
     if len(kinds) > 1:
@@ -119,7 +142,11 @@ def literal_names(field: FieldInfo) -> tuple[str, ...]:
 
 
 def item_count_message(field: FieldInfo) -> str:
-    """Return a message about the required number of items in the list of a field."""
+    """Return the message that a list of a case file has a wrong number of items: at least one, or exactly n items.
+
+    Args:
+        field: Field of a parameter model whose type is a tuple, which gives the required number.
+    """
     items = typing.get_args(field.annotation)
     return "must be a list with at least one item" if Ellipsis in items else f"must be a list of {len(items)} items"
 

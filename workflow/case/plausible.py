@@ -67,7 +67,10 @@ NAMED_NUMBERS = {
 
 
 def find_implausible(case: Case) -> Iterator[Problem]:
-    """Yield a problem for each parameter with an implausible value.
+    """Yield a problem for each parameter whose value is outside of the plausible range of its physical dimension.
+
+    Args:
+        case: Case whose values are allowed; the user may confirm implausible ones with ``--force``.
 
     Yields:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
@@ -78,7 +81,10 @@ def find_implausible(case: Case) -> Iterator[Problem]:
 
 
 def implausible_tables(case: Case) -> Iterator[Problem]:
-    """Yield a problem for each pulse table with an implausible duration or value.
+    """Yield a problem for each pulse table whose last time or largest value is too large to be plausible.
+
+    Args:
+        case: Case with its pulse tables, which are read; the limit depends on the physical dimension.
 
     Yields:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.

@@ -84,7 +84,11 @@ def at_least(value: float, limit: float) -> dict:
 
 
 def worst(values: Iterable[float]) -> float:
-    """Return the largest magnitude: nan if any value is nan, zero without values."""
+    """Return the largest magnitude of some values: nan if any value is nan, zero without values.
+
+    Args:
+        values: Numbers in one unit, such as relative errors.
+    """
     magnitudes = [abs(value) for value in values]
     return float("nan") if any(value != value for value in magnitudes) else max(magnitudes, default=0.0)
 

@@ -51,7 +51,7 @@ def take_scales(table: dict, problems: list[Problem]) -> dict[str, dict[str, obj
 
 
 def is_key(text: str) -> bool:
-    """Return whether a text is a valid dotted key."""
+    """Return whether a text is a valid dotted key: names separated by dots, none empty, and not nested too deep."""
     names = text.split(".")
     return all(names) and len(names) <= DEEPEST
 

@@ -77,7 +77,7 @@ ERRORS = Stage("errors", (ERROR_METHOD,), (SHOCK,), ("errors/errors.json",))
 
 
 def report_of(*follows: str, parameters: tuple[str, ...] = ()) -> Stage:
-    """Return the report stage of a pipeline.
+    """Return the stage of a pipeline that writes ``report.html`` and ``summary.json``.
 
     Args:
         follows: Names of the stages whose products it reads.

@@ -16,6 +16,9 @@ DEEPEST = 16  # nesting depth; no case needs more than five
 def read_text(path: Path) -> str:
     """Read the text of a TOML file without its byte order mark.
 
+    Args:
+        path: File to read.
+
     Raises:
         CaseError: The file is missing, not a regular file, too large, or not UTF-8.
     """
@@ -59,16 +62,23 @@ def parse_toml(source: str, text: str) -> dict:
 
 
 def read_toml(path: Path) -> dict:
-    """Read a TOML file.
+    """Read a TOML file as nested tables.
+
+    Args:
+        path: File to read.
 
     Raises:
-        CaseError: The file cannot be read as text, or is not TOML; see ``read_text`` and ``parse_toml``.
+        CaseError: The file is missing, not a regular file, too large, not UTF-8, or not TOML (with line and column).
     """
     return parse_toml(str(path), read_text(path))
 
 
 def is_too_deep(value: object) -> bool:
-    """Return whether tables and lists are nested deeper than ``DEEPEST``."""
+    """Return whether tables and lists are nested deeper than ``DEEPEST`` (16) levels.
+
+    Args:
+        value: Value of a parsed TOML file: table, list or plain value.
+    """
     level = [value]
     for _ in range(DEEPEST):
         level = [
@@ -83,7 +93,15 @@ def is_too_deep(value: object) -> bool:
 
 
 def fault_of(path: Path, most_bytes: int) -> str:
-    """Return why a path is not a readable file of at most ``most_bytes`` bytes; empty if it is one."""
+    """Return why a path cannot be read as an input file; empty if it can.
+
+    Args:
+        path: Path to check.
+        most_bytes: Largest allowed size of the file [B].
+
+    Returns:
+        Text that says that the path is missing, not a regular file, not readable, or too large.
+    """
     try:
         status = path.stat()
     except FileNotFoundError:
@@ -102,7 +120,12 @@ def fault_of(path: Path, most_bytes: int) -> str:
 
 
 def resolved_path(folder: Path, name: str) -> str:
-    """Return the absolute path of a file named relative to the folder of the case."""
+    """Return the absolute path of a file that a case names.
+
+    Args:
+        folder: Folder of the case file.
+        name: Path of the file, relative to this folder or absolute.
+    """
     try:
         return str((folder / name).resolve())
     except (OSError, RuntimeError, ValueError):  # a loop of links, a null character: reported later by the gate

@@ -23,7 +23,7 @@ LINES = ("solid", "dashed", "dotted")
 
 
 def show(runs: Sequence[ComparedRun], console: Console) -> None:
-    """Print the parameters and the first results in which two or more runs differ, or that all are equal.
+    """Print the parameters and the most important results in which two or more runs differ, or that all are equal.
 
     Args:
         runs: Two or more runs; the first one is the reference of the changes.
@@ -76,14 +76,13 @@ def write(runs: Sequence[ComparedRun], path: Path) -> None:
 
 
 def histories(runs: Sequence[ComparedRun]) -> list[Chart]:
-    """Return charts of common histories: board centre, critical joint of the first run, watch points.
+    """Return charts of histories that all runs have: board centre, critical joint of the first run, watch points.
 
     Args:
-        runs: Two or more runs; without a shock in one of them there are no charts.
-
+        runs: Two or more runs; the list is empty unless each of them has a shock.
 
     Returns:
-        Interactive charts for the report page.
+        Interactive charts for the report page, one curve for each run.
     """
     from reflowshock.fem.output.ranking import PEEL, critical_joint
     from reflowshock.workflow.report.histories import joint_stress

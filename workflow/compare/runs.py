@@ -50,7 +50,10 @@ class ComparedRun:
 
 
 def read_runs(folders: Sequence[Path]) -> list[ComparedRun]:
-    """Read two or more run folders.
+    """Read two or more run folders; nothing is written.
+
+    Args:
+        folders: Run folders of the same kind of case.
 
     Returns:
         Name, resolved case, summary and history arrays of each run, in the order of the folders.
@@ -88,13 +91,14 @@ def _read(folder: Path, name: str) -> ComparedRun:
 
 
 def parameters(runs: Sequence[ComparedRun]) -> dict:
-    """Return the table of parameters in which the runs differ, one column per run.
+    """Return the table of parameters in which runs differ.
 
     Args:
         runs: Two or more runs.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text); missing values are "–".
+        Table with ``head`` (column titles) and ``rows`` (lists of text): key of the parameter, and its value in each
+        run in the user's unit; missing values are "–".
     """
     values = [display_values(run.case) for run in runs]
     keys = dict.fromkeys(key for texts in values for key in texts if not key.startswith("case."))
@@ -103,13 +107,14 @@ def parameters(runs: Sequence[ComparedRun]) -> dict:
 
 
 def results(runs: Sequence[ComparedRun]) -> dict:
-    """Return the table of verdicts and metrics, the most important first, with changes relative to the first run.
+    """Return the table of verdicts and metrics of runs, the most important first.
 
     Args:
         runs: Two or more runs.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text); missing values are "–".
+        Table with ``head`` (column titles) and ``rows`` (lists of text): name, and value in each run with its change
+        relative to the first run; missing values are "–".
     """
     metrics = [run.summary["metrics"] for run in runs]
     names = dict.fromkeys([*FIRST, *(name for run_metrics in metrics for name in run_metrics)])
@@ -134,14 +139,14 @@ def select_differing(table: Mapping[str, Any]) -> dict:
 
 
 def joints(runs: Sequence[ComparedRun]) -> dict | None:
-    """Return the table of peak peel stress of all common joints, ordered by the first run; None without a shock.
+    """Return the table of peak peel stress of the joints that all runs have, ordered by their rank in the first run.
 
     Args:
         runs: Two or more runs.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text), with the rank of the joint in each run in the
-        last column; None without a shock.
+        Table with ``head`` (column titles) and ``rows`` (lists of text): joint, peak in each run, and its rank in each
+        run in the last column; None unless all runs have a shock.
     """
     from reflowshock.workflow.report.histories import peel_peaks
 

@@ -45,6 +45,10 @@ def detect_array(component: Component, path: Path) -> Array:
         component: Component to inspect.
         path: File of the board, for messages.
 
+    Returns:
+        Numbers of rows and columns, pitch [m], names of missing joints, diameters of pads and mask openings [m], and
+        quarter turns from the board's frame to the frame of the array.
+
     Raises:
         EcadError: The pads differ in size or do not lie on a square grid along the board's axes.
     """

@@ -30,7 +30,10 @@ MAX_ROWS = 40
 
 
 def read_layout(path: Path) -> Layout:
-    """Read a board from a file, by its suffix, or from a folder of Gerber and drill files.
+    """Read a board from an ECAD file, by its suffix, or from a folder of Gerber and drill files.
+
+    Args:
+        path: KiCad, IPC-2581 or CSV file, or a folder.
 
     Returns:
         Outline, thickness (None if not in the file), holes, and components with their pads, in SI units.
@@ -48,7 +51,12 @@ def read_layout(path: Path) -> Layout:
 
 
 def show_layout(layout: Layout, console: Console) -> None:
-    """Print outline, holes and components, the components with the most pads first."""
+    """Print a board: outline, holes and components, the components with the most pads first.
+
+    Args:
+        layout: Board as its file describes it.
+        console: Console to print to.
+    """
     sides = [high - low for low, high in zip(layout.low, layout.high, strict=True)]
     thickness = in_mm(layout.thickness, 4) if layout.thickness else "not given"
     console.print(f"outline {in_mm(sides[0], 6)} x {in_mm(sides[1], 6)}, thickness {thickness}")

@@ -35,7 +35,10 @@ VIA = "ViaDrill"
 
 
 def read_gerber(path: Path) -> Layout:
-    """Read a board from a folder with copper, outline and drill files.
+    """Read a board from a folder with Gerber files of copper and outline, and drill files.
+
+    Args:
+        path: Folder.
 
     Returns:
         Outline, thickness (None if not in the file), holes, and components with their pads, in SI units.

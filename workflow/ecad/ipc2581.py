@@ -32,7 +32,10 @@ Element = ElementTree.Element
 
 
 def read_ipc2581(path: Path) -> Layout:
-    """Read the first step of an IPC-2581 file.
+    """Read a board from the first step of an IPC-2581 file (XML).
+
+    Args:
+        path: File to read.
 
     Returns:
         Outline, thickness (None if not in the file), holes, and components with their pads, in SI units.

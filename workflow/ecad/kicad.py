@@ -42,7 +42,10 @@ BODIES = ("Fab", "CrtYd")  # layers that show the body of a component, in order 
 
 
 def read_kicad(path: Path) -> Layout:
-    """Read a board from a KiCad file.
+    """Read a board from a KiCad file (``.kicad_pcb``).
+
+    Args:
+        path: File to read.
 
     Returns:
         Outline, thickness (None if not in the file), holes, and components with their pads, in SI units.

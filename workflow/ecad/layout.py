@@ -102,7 +102,10 @@ def in_mm(length: float, digits: int = 10) -> str:
 
 
 def check_file(path: Path) -> Path:
-    """Return the path of an existing file of at most ``MAX_FILE_SIZE`` bytes.
+    """Return the path of a file unchanged if the file exists and has at most ``MAX_FILE_SIZE`` (200 million) bytes.
+
+    Args:
+        path: File to check.
 
     Raises:
         EcadError: The file does not exist or is too large.
@@ -116,6 +119,9 @@ def check_file(path: Path) -> Path:
 
 def check_layout(layout: Layout) -> Layout:
     """Return a layout unchanged if its dimensions are plausible.
+
+    Args:
+        layout: Board with outline, holes and components.
 
     Raises:
         EcadError: A dimension is not positive, or the board is too small.
@@ -176,7 +182,7 @@ def box_around(points: list[Point]) -> tuple[Point, Point]:
 
 
 def round_diameter(shape: str, width: float, height: float) -> float:
-    """Return the diameter of the circle with the area of a shape.
+    """Return the diameter of the circle that has the area of a pad or hole, in the unit of its sides.
 
     Args:
         shape: "circle", "oval", or anything else for a rectangle.
@@ -192,10 +198,10 @@ def round_diameter(shape: str, width: float, height: float) -> float:
 
 
 def arc_about(centre: Point, start: Point, end: Point, clockwise: bool, pieces: int = 64) -> list[Point]:
-    """Return points along an arc about a centre.
+    """Return points along an arc about a centre, equally spaced, ends included.
 
     Args:
-        centre: Centre (x, y).
+        centre: Centre (x, y); all lengths are in one unit.
         start: First point of the arc.
         end: Last point of the arc; a full circle if it coincides with the first.
         clockwise: Direction of the arc.

@@ -31,7 +31,10 @@ COLUMNS = ("kind", "reference", "pin", *LENGTHS)
 
 
 def read_table(path: Path) -> Layout:
-    """Read a board from a CSV table.
+    """Read a board from a CSV table, with one line for each corner of the outline, hole and pad.
+
+    Args:
+        path: CSV file.
 
     Returns:
         Outline, thickness (None if not in the file), holes, and components with their pads, in SI units.

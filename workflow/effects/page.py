@@ -23,7 +23,11 @@ FIELDS = (
 
 
 def show_registry(console: Console) -> None:
-    """Print a table of all effects of the program for each stage: term, number, influence, switch, implementation."""
+    """Print a table of all effects of the program for each stage: term, number, influence, switch, implementation.
+
+    Args:
+        console: Console to print to.
+    """
     for stage in dict.fromkeys(effect.stage for effect in registry().values()):
         table = new_table(f"\nEffects of the {stage}", "effect", "", "description")
         for effect in registry().values():
@@ -50,12 +54,15 @@ def _add(table: Table, effect: Effect) -> None:
 
 
 def effects_table(case: Case, effects: Mapping[str, Any], of_what: str) -> Table:
-    """Return the table for the terminal of a case's effects: on or off, expected influence, share of the cost, why.
+    """Return the table of a case's effects for the terminal.
 
     Args:
         case: Case of the effects.
         effects: Name of an effect -> its decision: ``on``, ``why`` and, if predicted, ``influence``.
-        of_what: What the effects act on, for the title.
+        of_what: Noun for the title, such as the process on which the effects act.
+
+    Returns:
+        Table with one row per effect: name, on or off, expected influence, share of the predicted cost, reason.
     """
     table = new_table(f"\nEffects of the {of_what}", *HEAD)
     for name, acts, influence, cost, why in rows(case, effects):

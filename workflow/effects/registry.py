@@ -10,7 +10,11 @@ SHOCK_SUFFIX = "_in_the_shock"
 
 @cache
 def registry() -> dict[str, Effect]:
-    """Return the effects of reflow, heating, drop and flow by name; the order is that of these kinds."""
+    """Return the effects of reflow, heating, drop and flow by name; the order is that of these kinds.
+
+    Returns:
+        Name -> stage, governing term, dimensionless number, influence and switch of the effect.
+    """
     from reflowshock.workflow.flows.registry import FLOWS
     from reflowshock.workflow.kinds import BOARD_DROP
 

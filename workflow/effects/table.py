@@ -23,7 +23,11 @@ MEASURED = Path(__file__).with_name("costs.json")  # written by benchmarks/effec
 
 @cache
 def read_measured_ratios() -> dict[str, float]:
-    """Return, by effect name, the processor time per step with the effect over that without it, as benchmarks found."""
+    """Return the cost of each effect per time step, as measured by benchmarks.
+
+    Returns:
+        Name of an effect -> processor time per step with the effect over the time without it.
+    """
     return {name: item["ratio"] for name, item in json.loads(MEASURED.read_text(encoding="utf-8"))["effects"].items()}
 
 
@@ -110,14 +114,15 @@ def per_cent(share: float) -> str:
 
 
 def report_table(case: Case, effects: Mapping[str, Any]) -> dict:
-    """Return the report table of simulated effects: influence, predicted cost and reason.
+    """Return the report table of the effects of a case: state, influence, predicted cost and reason.
 
     Args:
         case: Case of the effects.
         effects: Name of an effect -> its decision: ``on``, ``why`` and, if predicted, ``influence``.
 
     Returns:
-        Table with ``head``, ``rows`` (lists of text), ``prose`` and ``caption``.
+        Table with ``head`` (column titles), ``rows`` (lists of text, one per effect), ``prose`` (True, since the last
+        column is wrapped text) and ``caption``.
     """
     table_rows = [
         [name, "on" if acts else "off", influence, cost, why]

@@ -42,6 +42,9 @@ class DamBreakCase(FlowCase):
 def dam_problems(case: DamBreakCase) -> list[Problem]:
     """Find a column that does not fit into its tank, and a sensor that is not at the wall.
 
+    Args:
+        case: Case of a dam break.
+
     Returns:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
     """

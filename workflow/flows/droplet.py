@@ -57,6 +57,9 @@ class DropletCase(FlowCase):
 def droplet_problems(case: DropletCase) -> list[Problem]:
     """Find values that are given twice or have no meaning, a speed of sound too low, and particles too large.
 
+    Args:
+        case: Case of a single droplet.
+
     Returns:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
     """
@@ -206,7 +209,10 @@ def _reference_widths(drop: Droplet, ends: Floats) -> "list[Series]":
 
 
 def plan_rows(drop: Droplet) -> list[Row]:
-    """Return the dimensionless numbers of a droplet and its state at rest, as rows of ``plan``.
+    """Return the dimensionless numbers of a droplet and its state at rest, as rows of the table that ``plan`` prints.
+
+    Args:
+        drop: Parameters of the droplet.
 
     Returns:
         Quantity, value and remark of each row, as text.

@@ -103,7 +103,7 @@ class FlowKind:
 
 
 def flow_pipeline(scene: str, *products: str) -> Pipeline:
-    """Return the pipeline of a flow: the stage ``particles`` and the report.
+    """Return the pipeline of a flow: the stage ``particles``, which computes it, and the report.
 
     Args:
         scene: Table of the case file on which the stage depends.

@@ -33,6 +33,9 @@ class PoiseuilleCase(FlowCase):
 def channel_problems(case: PoiseuilleCase) -> list[Problem]:
     """Find a viscosity law with foreign keys, a Reynolds number that is too large, and missing viscosity.
 
+    Args:
+        case: Case of a channel flow (Poiseuille).
+
     Returns:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
     """

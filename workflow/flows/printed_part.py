@@ -43,8 +43,8 @@ def add_part(products: Path, context: dict) -> None:
     """Add height map, surface and table of layers to the context of the report.
 
     Args:
-        products: Folder with the products of the stage ``particles``.
-        context: Context of the page's template, changed in place.
+        products: Folder with the products of the stage ``particles``: ``height_map.png``, ``part.stl``, ``layers.csv``.
+        context: Context of the page's template, changed in place: ``pictures``, ``scenes``, ``tables``.
     """
     context["pictures"]["heights"] = base64.b64encode((products / "height_map.png").read_bytes()).decode()
     context["scenes"]["part"] = part_scene(products / "part.stl")
@@ -76,7 +76,8 @@ def layer_table(file: Path) -> dict:
         file: CSV file ``layers.csv`` of the stage.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text).
+        Table with ``head`` (column titles) and ``rows`` (lists of text): layer, height, roughness Sa and Sz [µm],
+        volume [pL], number of connected parts and of voids.
     """
     head = file.read_text(encoding="utf-8").splitlines()[0].split(",")
     columns = [head.index(name) for name in COLUMNS]

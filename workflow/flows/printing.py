@@ -45,6 +45,9 @@ class PrintingCase(FlowCase):
 def printing_problems(case: PrintingCase) -> list[Problem]:
     """Find drops that pile up, particles too large, a speed of sound too low, short delays, and impossible freezing.
 
+    Args:
+        case: Case of a part that is printed drop by drop.
+
     Returns:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
     """

@@ -11,5 +11,9 @@ FLOWS = (DAM_BREAK, POISEUILLE, TAYLOR_GREEN, DROPLET, PRINTING)
 
 
 def flow_of(case: FlowCase) -> FlowKind:
-    """Return the record of a flow case's kind: its solver, limits, cost and charts."""
+    """Return the description of a flow case's kind: its solver, limits, cost and charts.
+
+    Args:
+        case: Case of a flow, such as a dam break or a droplet.
+    """
     return next(flow for flow in FLOWS if flow.case is type(case))

@@ -19,14 +19,15 @@ NO_FACES = np.zeros((0, 3), dtype=int)
 
 
 def add_flow(flow: FlowKind, run_folder: Path, case: FlowCase, context: dict, summary: dict) -> None:
-    """Add the section of a flow to the context of the report.
+    """Add the section of a flow to the context of the report: headline, table of metrics, charts and scene.
 
     Args:
         flow: Kind of flow.
         run_folder: Run folder with the products.
         case: Case of the run.
-        context: Context of the page's template, changed in place.
-        summary: Content of ``summary.json``.
+        context: Context of the page's template, changed in place: ``headline``, ``tables``, ``curves``, ``scenes``,
+            ``flow_caption``.
+        summary: Content of ``summary.json``, of which ``metrics`` and ``health`` are read.
     """
     from reflowshock.particles.scenes.products import read_flow
 

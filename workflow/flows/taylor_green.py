@@ -31,6 +31,9 @@ class TaylorGreenCase(FlowCase):
 def vortex_problems(case: TaylorGreenCase) -> list[Problem]:
     """Find a viscosity that is not constant, a Reynolds number that is too large, and missing viscosity.
 
+    Args:
+        case: Case of decaying vortices (Taylor-Green).
+
     Returns:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
     """
@@ -51,9 +54,10 @@ def _solve(
 
 
 def vortex_curves(_scene: TaylorGreen, result: "FlowResult") -> "list[Chart]":
-    """Return charts of the largest speed next to the exact one, and of the kinetic energy.
+    """Return charts of the largest speed over time next to the exact one, and of the kinetic energy.
 
     Args:
+        _scene: Not used; all functions of charts take the parameters of the flow.
         result: Result of the flow: snapshots, history (name -> samples, time in s) and metrics.
 
     Returns:

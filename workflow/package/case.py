@@ -68,6 +68,9 @@ def package_pipeline(heated: bool, dropped: bool, estimated: bool = False) -> Pi
         heated: Whether the reflow has temperatures, and so needs the mesh of board and package.
         dropped: Whether the case has a shock.
         estimated: Whether companions on coarser meshes estimate the errors of the shock.
+
+    Returns:
+        Stages in the order in which they run, each with its inputs and products.
     """
     geometry = Stage(
         "geometry", DRAWN_MESH, (), ("geometry/assembly.msh", "geometry/pads.json", "geometry/preview.png")
@@ -98,9 +101,13 @@ BOARD_DROP = package_pipeline(heated=False, dropped=True)
 
 
 def joint_geometries(pads: "Sequence[PadSite]") -> "dict[str, JointGeometry]":
-    """Return the geometry (gap, radii, offset, tilt) of each joint of a pad table, by joint name.
+    """Return the geometry of each joint of a pad table, by joint name.
 
-    Lengths are in metres, angles in radians; radii are those that solder can wet.
+    Args:
+        pads: Pad table, one entry per joint.
+
+    Returns:
+        Name -> gap, offset and wettable radii [m], and tilt [rad] of the joint.
     """
     from reflowshock.particles.core.geometry import JointGeometry
 

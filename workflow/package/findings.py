@@ -140,10 +140,11 @@ def of_surface(surfaces: Records) -> Findings:
 
 
 def of_solder_mesh(qualities: Mapping[str, Records], effects: Mapping[str, Any]) -> Findings:
-    """Return metrics and checks of joint meshes: volume, scaled Jacobian, critical time step.
+    """Return metrics and checks of joint meshes: worst volume error, scaled Jacobian and critical time step.
 
     Args:
-        qualities: Quality by kind of mesh (prefix of the metrics), then by joint.
+        qualities: Prefix of the metrics for a kind of mesh, empty for fine joints -> joint -> record with
+            ``volume_error``, ``minimum_scaled_jacobian`` and ``critical_time_step`` [s].
         effects: Name of an effect -> its decision: ``on``, ``why`` and, if predicted, ``influence``, for effects that
             add joint meshes.
 

@@ -32,7 +32,14 @@ def located(table: dict, folder: Path) -> dict:
 
 
 def files(package: "Package") -> dict[str, Path]:
-    """Return the user's surface files by dotted key, ``package.surfaces.<joint>``."""
+    """Return the surface files that the user gives for joints.
+
+    Args:
+        package: Package of the case.
+
+    Returns:
+        Dotted key ``package.surfaces.<joint>`` -> path; empty without given surfaces.
+    """
     return {f"{KEY}.{name}": Path(path) for name, path in package.surfaces.items()}
 
 

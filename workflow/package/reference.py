@@ -58,13 +58,26 @@ def _run_folder(case_file: Path) -> Path:
 
 
 def files(reference: "Reference | None") -> dict[str, Path]:
-    """Return the record of the reference's shock by dotted key; empty without a reference, or if it has no record."""
+    """Return the file of a case's reference on which the case depends: the record of the reference's shock.
+
+    Args:
+        reference: Run folder of a design with which this one is compared; None without one.
+
+    Returns:
+        Dotted key -> path of the record; empty without a reference or without that file.
+    """
     path = None if reference is None else Path(reference.run) / STAGE / RECORD
     return {KEY: path} if path is not None and path.is_file() else {}
 
 
 def metrics_of(reference: "Reference | None") -> Mapping[str, dict] | None:
-    """Return the metrics of the reference's shock; None without a reference.
+    """Return the metrics of the shock of a reference design.
+
+    Args:
+        reference: Run folder of the design with which this one is compared; None without one.
+
+    Returns:
+        Name -> record with ``value`` (SI) and ``unit``; None without a reference.
 
     Raises:
         StageError: The record is missing or damaged.

@@ -33,7 +33,7 @@ def shapes_scene(run_folder: Path, joints: Sequence[Mapping[str, Any]]) -> Scene
 
     Args:
         run_folder: Folder of the run; without closed surfaces the shapes of the reflow are shown.
-        joints: Records of the joints, see ``joint_records``.
+        joints: Records of the joints with ``name``, ``shape`` and measures in SI units, see ``joint_records``.
 
     Returns:
         Interactive 3D scene for the report page.
@@ -130,13 +130,14 @@ class Map:
 
 
 def array_maps(joints: Sequence[Mapping[str, Any]]) -> list[Map]:
-    """Return up to four maps of the array, one for each quantity of ``MAPS`` that the joints have.
+    """Return up to four maps of the array of joints, one for each quantity that the joints have.
 
     Args:
-        joints: Records with name, x, y [m] and quantities of ``MAPS``, see ``joint_records``.
+        joints: Records with name, x, y [m] and any of ``standoff``, ``max_width`` [m], ``contact_angle_package``,
+            ``contact_angle_board`` [deg] and ``tilted`` [rad], see ``joint_records``.
 
     Returns:
-        Maps with one coloured cell per joint and a colour scale.
+        Maps with one coloured cell per joint and a colour scale; quantities without values have no map.
     """
     available = [entry for entry in MAPS if any(entry[0] in joint for joint in joints)][:PANELS]
     return [_map(joints, *entry) for entry in available]

@@ -17,7 +17,7 @@ from reflowshock.workflow.report.spectra import mode_table, spectrum_curves
 def add_board(
     shock: Path, case: BoardDropCase, histories: Histories, metrics: Mapping[str, Any], context: dict
 ) -> None:
-    """Add curves and tables of the board to the context of a report.
+    """Add curves and tables of the board to the context of a report: watch points, strain gauges, input, natural modes.
 
     Args:
         shock: Folder of the shock, which is read.
@@ -25,7 +25,7 @@ def add_board(
         histories: Mode -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity, the
             main mode first.
         metrics: Name -> record with ``value`` (SI) and ``unit``.
-        context: Context of the page's template, changed in place.
+        context: Context of the page's template, changed in place: ``curves``, ``tables``, ``board_filter``.
     """
     from reflowshock.fem.loads.shock_pulse import shock_pulse
 
@@ -44,14 +44,15 @@ def add_board(
 
 
 def watch_table(case: BoardDropCase, metrics: Mapping[str, Any]) -> dict:
-    """Return the table of peaks at the watch points; empty without watch points.
+    """Return the table of peaks at the watch points of a drop.
 
     Args:
         case: Case with the watch points.
         metrics: Name -> record with ``value`` (SI) and ``unit``.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text); an empty dict without watch points.
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per watch point: name, position, peak
+        displacement [mm], peak acceleration and peak of opposite sign [G]; an empty dict without watch points.
     """
     rows = []
     for name, point in case.watch.items():

@@ -18,13 +18,13 @@ PEEL = "peel_stress"
 
 
 def conclude(run_folder: Path, case: BoardDropCase, summary: dict, known: Discretisation) -> None:
-    """Add verdict, warnings, answer and discretisation error to a summary, if the shock was run.
+    """Add verdict, warnings, answer and discretisation errors to the summary of a run, if the shock was run.
 
     Args:
-        run_folder: Folder of the run.
+        run_folder: Folder of the run, from which histories and results of the shock are read.
         case: Case with the failure limits.
-        summary: Content of ``summary.json``, changed in place: ``verdict``, ``warnings``, ``answer`` and one metric are
-            added.
+        summary: Content of ``summary.json``, changed in place: ``verdict``, ``warnings``, ``answer`` (one line of
+            text), ``errors`` and, if it is known, the metric ``discretisation_error`` are added.
         known: Discretisation errors of the metrics.
     """
     histories, results = read_modes(run_folder / "shock")

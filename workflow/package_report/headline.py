@@ -50,7 +50,7 @@ def later_swings(shock: Shock, end: float, why: str = "") -> str:
 
 
 def headline(metrics: Mapping[str, dict], known: Discretisation, summary: Mapping, results: Mapping[str, Any]) -> dict:
-    """Return the table of headline figures with the errors that are known, and a note with the neglected effects.
+    """Return the table of the main figures of a shock with their known errors, and a note on the neglected effects.
 
     Args:
         metrics: Name -> record with ``value`` (SI) and ``unit``.
@@ -60,7 +60,8 @@ def headline(metrics: Mapping[str, dict], known: Discretisation, summary: Mappin
             the main mode first.
 
     Returns:
-        Table with ``head``, ``rows`` (lists of text) and ``note``; a column without any error is left out.
+        Table with ``head``, ``rows`` (lists of text) and ``note``: figure, value, discretisation error and two-scale
+        error; a column of errors in which none is known is left out.
     """
     rows = [
         [

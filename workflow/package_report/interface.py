@@ -131,7 +131,9 @@ def table(interfaces: Mapping[str, Arrays]) -> dict:
             ``von_mises@`` (k, q) [Pa]; one or two modes.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per picture time.
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per picture time: time [ms]; largest
+        stress, its joint and mean stress [MPa] of each mode; relative L2 difference of two modes on the joints with
+        equal faces.
     """
     shared = comparable(interfaces)
     rows = []

@@ -53,10 +53,11 @@ def shapes(joints: Sequence[Record]) -> dict:
     """Return the table of distinct joint shapes, by increasing standoff.
 
     Args:
-        joints: Records of the joints, see ``joint_records``.
+        joints: Records of the joints with ``name``, ``shape`` and measures in SI units, see ``joint_records``.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per shape.
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per shape: joints, and the measures
+        that exist, such as standoff, width, contact angles, tilt, axial force and volume drift.
     """
     return record_table(SHAPE_COLUMNS, by_shape(joints), lambda key, values: values[0])
 
@@ -68,7 +69,8 @@ def verdicts(run_folder: Path) -> dict:
         run_folder: Run folder, of which ``reflow/joints.json`` is read.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per joint.
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per joint: name, verdict, joints that
+        it touches, standoff and largest width [µm].
     """
     joints = read_json(run_folder / "reflow/joints.json")
     rows = [
@@ -95,12 +97,14 @@ def ranked_joints(
     Args:
         history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity
             with one column per joint.
-        joints: Records of the joints, see ``joint_records``.
+        joints: Records of the joints with ``name``, ``shape`` and measures in SI units, see ``joint_records``.
         judged: Name of a joint -> record with ``verdict``, ``margin`` (None without a limit) and ``criterion``.
         fine: Names of the fine joints; None if all are fine.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per joint, the most stressed first.
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per joint, the most stressed first:
+        name, verdict, margin, peak stresses, plastic work if any, worse pad, time of the peak, section force and
+        moment, standoff and width.
     """
     shape = {joint["name"]: joint for joint in joints}
     measure = ranking_measure(history)
@@ -175,11 +179,12 @@ def meshes(joints: Sequence[Record]) -> dict | None:
     """Return the table of mesh quality, the worst of each shape; None before the joints are meshed.
 
     Args:
-        joints: Records of the joints, see ``joint_records``.
+        joints: Records of the joints with ``name``, ``shape`` and measures in SI units, see ``joint_records``.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per shape; None before the joints are
-        meshed.
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per shape: meshing method, errors of
+        volume, standoff and contact area, smallest scaled Jacobian, critical time step and others that exist. None
+        before the joints are meshed.
     """
     if not any("minimum_scaled_jacobian" in joint for joint in joints):
         return None
@@ -190,10 +195,12 @@ def missed_tries(joints: Sequence[Record]) -> dict | None:
     """Return the table of failed meshing attempts; None if every first attempt succeeded.
 
     Args:
-        joints: Records of the joints, see ``joint_records``; ``tries`` lists the failed attempts.
+        joints: Records of the joints with ``name``, ``shape`` and measures in SI units, see ``joint_records``;
+            ``tries`` lists the failed attempts.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per attempt; None without failed ones.
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per failed attempt: joint, method and
+        unmet criterion; None without failed attempts.
     """
     rows = [
         [joint["name"], attempt["method"], attempt["missed"]] for joint in joints for attempt in joint.get("tries", ())

@@ -13,7 +13,7 @@ BRIDGE_CAPTION = "bridged: particles and free surface; the last frame is coloure
 
 
 def add_joints(run_folder: Path, context: dict) -> None:
-    """Add shapes, maps, verdicts and meshes of all joints, as far as the run has gone.
+    """Add shapes, maps, verdicts and meshes of all joints to the context of a report, as far as the run has gone.
 
     Args:
         run_folder: Run folder; without ``reflow/joints.json`` nothing is added.
@@ -43,10 +43,14 @@ def add_joints(run_folder: Path, context: dict) -> None:
 
 
 def headline(joints: Sequence[Mapping[str, Any]]) -> list[dict]:
-    """Return the figures of the joints at the top of the page: records with ``value`` and ``label`` as text.
+    """Return the figures of the joints at the top of the page: range of standoffs, numbers of joints and of shapes.
 
     Args:
-        joints: Records of the joints, see ``joint_records``.
+        joints: Records of the joints with ``name``, ``shape`` and measures in SI units, see ``joint_records``; at least
+            one.
+
+    Returns:
+        Two records with ``value`` and ``label`` as text.
     """
     standoffs = sorted({f"{1e6 * joint['standoff']:.0f}" for joint in joints}, key=float)
     shapes = len({joint["shape"] for joint in joints})

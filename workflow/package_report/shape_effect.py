@@ -19,12 +19,12 @@ MOST_JOINTS = 30  # joints of the chart, the critical one first
 
 
 def in_words(real: Arrays, identical: Arrays) -> str:
-    """Return a sentence on how the real shapes change the peel stress of the critical joint.
+    """Return a sentence on how the real shapes change the peak peel stress of the critical joint.
 
     Args:
         real: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity, of
             the shock with real joints.
-        identical: The same arrays of the shock with identical joints.
+        identical: The same arrays of a shock with identical joints (truncated spheres of equal height).
     """
     peaks, identical_peaks = peel_peaks(real), peel_peaks(identical)
     critical, other = next(iter(peaks)), next(iter(identical_peaks))
@@ -49,7 +49,8 @@ def table(real: Arrays, identical: Arrays, joints: Sequence[Mapping]) -> dict:
         joints: Records with ``name`` and ``standoff`` [m], see ``joint_records``.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per joint.
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per joint: name, both peaks [MPa],
+        relative change, standoff of the real joint [µm].
     """
     peaks, identical_peaks = peel_peaks(real), peel_peaks(identical)
     standoff = {joint["name"]: joint["standoff"] for joint in joints}

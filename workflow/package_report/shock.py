@@ -23,13 +23,13 @@ SIDES = ("von_mises_board", "von_mises_package")
 
 
 def add_shock(run_folder: Path, case: BoardDropCase, context: dict, summary: dict) -> None:
-    """Add the sections on the shock to the context of a report, if the shock was run.
+    """Add the sections on the shock to the context of a report: headline, verdict, curves, tables and scenes.
 
     Args:
-        run_folder: Run folder; without the product of the shock nothing is added.
+        run_folder: Run folder; without a history of the shock nothing is added.
         case: Case of the run.
         context: Context of the page's template, changed in place.
-        summary: Content of ``summary.json``.
+        summary: Content of ``summary.json`` with metrics, verdict and effects.
     """
     shock = run_folder / "shock"
     histories, results = read_modes(shock)
@@ -100,7 +100,10 @@ def kinematics_note(metrics: dict, kinematics: str) -> str:
 
 
 def ranking_mode(histories: dict, results: dict) -> str:
-    """Return the mode whose history ranks the joints: the one with all joints fine, unless it ended early.
+    """Return the mode whose history ranks the joints.
+
+    It is the DNS (one model with all joints fine) if the main run has coarse joints and the DNS lasted as long;
+    otherwise the main mode.
 
     Args:
         histories: Mode -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity, the
@@ -230,7 +233,8 @@ def table(joints: Mapping[str, list]) -> dict:
             stresses [Pa] such as ``von_mises_board``, and optionally ``plastic_strain_max``.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per joint.
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per joint: name, von Mises stress at
+        the board pad, at the package pad and in an element [MPa], and largest plastic strain if it was stored.
     """
     columns = [joints[name] for name in (*SIDES, "von_mises_max")]
     strains = joints.get("plastic_strain_max")

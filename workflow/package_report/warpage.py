@@ -65,14 +65,14 @@ class Face:
 
 
 def faces(structure: Mapping[str, NDArray]) -> tuple[Face, Face]:
-    """Return the underside of the package and the top face of the board below it.
+    """Return the underside of the package and the top face of the board below it, with their lifts at solidification.
 
     Args:
-        structure: Arrays of ``reflow/structure.npz`` (``points``, ``displacement``, ``package``, ``temperature``,
-            ``pad_motion``, …).
+        structure: Arrays of ``reflow/structure.npz``: nodes ``points`` and ``displacement``, shape (n, 3) [m], and
+            ``package``, mask of its nodes, shape (n,).
 
     Returns:
-        Both faces with their nodes, shape (n, 3), and lifts, shape (n,) [m].
+        Both faces with their nodes, shape (n, 3), and lifts along z, shape (n,) [m].
     """
     points, displacement, package = (structure[name] for name in ("points", "displacement", "package"))
     under = package & (points[:, 2] <= points[package, 2].min() + SAME_HEIGHT)
@@ -85,8 +85,9 @@ def warpage_scene(structure: Mapping[str, NDArray], joints: Sequence[Mapping[str
     """Return both faces with their lift relative to the centre, and the positions of the joints between them.
 
     Args:
-        structure: Arrays of ``reflow/structure.npz`` (``points``, ``displacement``, ``package``, ``temperature``,
-            ``pad_motion``, …).
+        structure: Arrays of ``reflow/structure.npz``: nodes ``points`` and ``displacement``, shape (n, 3) [m],
+            ``package`` (mask), ``temperature``, shape (steps,) [K], ``pad_motion``, shape (steps, joints, 2, 6) [m,
+            rad], and residuals per step.
         joints: Records with ``x``, ``y`` [m] and, optionally, ``name``.
 
     Returns:
@@ -116,11 +117,12 @@ def warpage_scene(structure: Mapping[str, NDArray], joints: Sequence[Mapping[str
 
 
 def profiles(structure: Mapping[str, NDArray]) -> list[Chart]:
-    """Return charts of the lift along the package diagonal, and of the joint gaps over temperature.
+    """Return two charts: lift of board and package along the package diagonal, and joint gaps over temperature.
 
     Args:
-        structure: Arrays of ``reflow/structure.npz`` (``points``, ``displacement``, ``package``, ``temperature``,
-            ``pad_motion``, …).
+        structure: Arrays of ``reflow/structure.npz``: nodes ``points`` and ``displacement``, shape (n, 3) [m],
+            ``package`` (mask), ``temperature``, shape (steps,) [K], and ``pad_motion``, shape (steps, joints, 2, 6) [m,
+            rad].
 
     Returns:
         Interactive charts for the report page.
@@ -146,15 +148,16 @@ def profiles(structure: Mapping[str, NDArray]) -> list[Chart]:
 
 
 def load_steps(structure: Mapping[str, NDArray]) -> dict:
-    """Return the table of load steps: temperature, corner motion, gaps, iterations, residuals.
+    """Return the table of load steps of a coupled reflow.
 
     Args:
-        structure: Arrays of ``reflow/structure.npz`` (``points``, ``displacement``, ``package``, ``temperature``,
-            ``pad_motion``, …).
+        structure: Arrays of ``reflow/structure.npz``, one row per load step: ``temperature`` [K],
+            ``corner_displacement`` [m], ``pad_motion`` (steps, joints, 2, 6) [m, rad], ``iterations``,
+            ``force_residual`` and ``rigid_residual``.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per load step; quantities
-        that are zero throughout have no column.
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per load step: temperature, corner
+        motion, changes of gaps, coupling iterations and residuals; quantities that are zero throughout have no column.
     """
     columns = [
         ("temperature [°C]", structure["temperature"] - KELVIN, ".1f"),
@@ -176,8 +179,9 @@ def in_words(structure: Mapping[str, NDArray]) -> str:
     """Return a sentence on the warpage of package and board and the change of the gaps at solidification.
 
     Args:
-        structure: Arrays of ``reflow/structure.npz`` (``points``, ``displacement``, ``package``, ``temperature``,
-            ``pad_motion``, …).
+        structure: Arrays of ``reflow/structure.npz``: nodes ``points`` and ``displacement``, shape (n, 3) [m],
+            ``package`` (mask), ``temperature``, shape (steps,) [K], ``pad_motion``, shape (steps, joints, 2, 6) [m,
+            rad], and residuals per step.
     """
     package, board = faces(structure)
     gaps = relative_lift(structure)[-1] / MICRO
@@ -193,8 +197,9 @@ def relative_lift(structure: Mapping[str, NDArray]) -> Floats:
     """Return the change of the gap of each joint: lift of its package pad minus lift of its board pad.
 
     Args:
-        structure: Arrays of ``reflow/structure.npz`` (``points``, ``displacement``, ``package``, ``temperature``,
-            ``pad_motion``, …); ``pad_motion`` has shape (steps, joints, 2, 6), board pad first.
+        structure: Arrays of ``reflow/structure.npz``: nodes ``points`` and ``displacement``, shape (n, 3) [m],
+            ``package`` (mask), ``temperature``, shape (steps,) [K], ``pad_motion``, shape (steps, joints, 2, 6) [m,
+            rad], and residuals per step; ``pad_motion`` has shape (steps, joints, 2, 6), board pad first.
 
     Returns:
         Change of the gap from the drawing, shape (steps, joints) [m].

@@ -67,7 +67,10 @@ def _values(case: Case, leave: Leave) -> list[Problem]:
 
 
 def unreadable_files(case: Case) -> Iterator[Problem]:
-    """Yield a problem for each input file that is missing, unreadable or too large.
+    """Yield a problem for each input file of a case that is missing, unreadable or too large.
+
+    Args:
+        case: Case with the paths of its files.
 
     Yields:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
@@ -81,6 +84,9 @@ def unreadable_files(case: Case) -> Iterator[Problem]:
 def too_many_ranks(case: Case) -> Iterator[Problem]:
     """Yield a problem for each key that requests more MPI ranks than this machine has cores.
 
+    Args:
+        case: Case with its numbers of ranks.
+
     Yields:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
     """
@@ -92,7 +98,12 @@ def too_many_ranks(case: Case) -> Iterator[Problem]:
 
 
 def too_large(case: Case, leave: Leave | None = None) -> Iterator[Problem]:
-    """Yield a problem if a case needs more memory than this machine has (than any machine, if oversubscribed).
+    """Yield a problem if the predicted memory of a case exceeds the memory of this machine.
+
+    Args:
+        case: Case to check.
+        leave: Permissions of the user: implausible values (``force``) skip the check; more ranks than cores
+            (``oversubscribe``, for runs elsewhere) allow any memory that a machine can have. None grants neither.
 
     Yields:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.

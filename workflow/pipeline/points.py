@@ -77,7 +77,10 @@ def settings_text(settings: Mapping[str, str]) -> str:
 
 
 def read_case_of_run(folder: Path) -> Case:
-    """Return the case of a run folder.
+    """Return the case of a run folder, from the file in its store.
+
+    Args:
+        folder: Run folder.
 
     Raises:
         CaseError: The folder is not a run folder, or its case is damaged.

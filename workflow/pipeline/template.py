@@ -39,7 +39,11 @@ HEADER = """\
 
 
 def templates() -> dict[str, Path]:
-    """Return the paths of the shipped case files by name."""
+    """Return the case files that are shipped with the program.
+
+    Returns:
+        Name of a case -> path of its file.
+    """
     return {path.parent.name: path for path in sorted(CASES.glob("*/case.toml"))}
 
 
@@ -74,7 +78,11 @@ def write_new_case(name: str, template: str, folder: Path = Path()) -> Path:
 
 
 def write_schema(folder: Path) -> None:
-    """Write the JSON schema of case files into a folder, where editors use it to complete a new case."""
+    """Write the JSON schema of case files, with which editors complete and check a new case.
+
+    Args:
+        folder: Folder into which ``reflowshock.schema.json`` is written; an existing one is replaced.
+    """
     (folder / "reflowshock.schema.json").write_text(json.dumps(case_schema(), indent=2), encoding="utf-8")
 
 

@@ -62,10 +62,11 @@ class EnvironmentProblem(RuntimeError):
 
 
 def prepare() -> None:
-    """Complete the environment of this process; heavy libraries must not be loaded yet.
+    """Complete the environment variables of this process and check its limits; heavy libraries must not be loaded yet.
 
     Raises:
-        EnvironmentProblem: The environment is unsuitable.
+        EnvironmentProblem: No folder for temporary files is writable, the command was started on several MPI ranks, or
+            a limit of the shell is too small.
     """
     check_ranks(os.environ)
     check_limits()
@@ -87,7 +88,7 @@ def restart_in_utf8() -> None:
 
 
 def escape_unencodable() -> None:
-    """Make standard output and error write characters missing in their encoding as escapes."""
+    """Make standard output and error write characters that the terminal's encoding lacks as escapes, not as errors."""
     for stream in (sys.stdout, sys.stderr):
         reconfigure = getattr(stream, "reconfigure", None)
         if reconfigure is not None:
@@ -95,7 +96,9 @@ def escape_unencodable() -> None:
 
 
 def complete(environment: MutableMapping[str, str]) -> None:
-    """Add missing variables that this process and its children need; repeated calls change nothing.
+    """Add the variables that this process and its children need and remove those of an MPI job.
+
+    Variables set by the user stay if they are usable; repeated calls change nothing.
 
     Args:
         environment: Variables by name, changed in place, usually ``os.environ``.
@@ -139,8 +142,11 @@ def check_ranks(environment: Mapping[str, str]) -> None:
 def check_limits() -> None:
     """Raise if a limit of the shell is too small, since libraries would fail without a clear message.
 
+    Checked are memory, size of files, number of open files (raised to a sufficient number if the system allows it), and
+    number of threads.
+
     Raises:
-        EnvironmentProblem: A limit is too small.
+        EnvironmentProblem: A limit is too small; the message names it with its ``ulimit`` option.
     """
     for number, least, message in MINIMUM_LIMITS:
         soft, _ = resource.getrlimit(number)

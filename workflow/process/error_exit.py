@@ -65,7 +65,11 @@ _run_folder: dict[str, Path] = {}  # "folder": run folder of this process, if it
 
 
 def set_run_folder(folder: Path) -> None:
-    """Set the run folder of this process, into whose logs ``report_error`` writes tracebacks."""
+    """Set the run folder of this process, into whose logs ``report_error`` writes tracebacks from now on.
+
+    Args:
+        folder: Run folder.
+    """
     _run_folder["folder"] = folder
 
 
@@ -114,10 +118,13 @@ def _describe_known(error: BaseException, where: Path | None) -> str:
 
 
 def describe_text(text: str) -> str:
-    """Return a plain description of a library message about exhausted resources, or an empty string.
+    """Return a plain description of a library message about exhausted resources, such as memory or disk space.
 
     Args:
         text: Message of a library.
+
+    Returns:
+        Sentence; empty if the message is about something else.
     """
     return next((words for pattern, words in LIBRARY_ERRORS if pattern.search(text)), "")
 
@@ -143,7 +150,13 @@ def _interrupt(*_: object) -> NoReturn:
 
 @contextmanager
 def one_line_errors() -> Iterator[None]:
-    """Convert every exception of the block to an error message of one line and ``SystemExit``."""
+    """Convert every exception of a ``with`` block to an error message of one line, and end the process.
+
+    The exit code is the one that ``report_error`` returns: 2 for errors of the input, 1 for others.
+
+    Raises:
+        SystemExit: The block raised an exception or ``SystemExit``; without an error the program continues.
+    """
     try:
         yield
         _flush()
@@ -182,6 +195,9 @@ def report_error(error: BaseException) -> int:
 
     Errors of the input have a line for each problem, the exit code 2 and no traceback. An interrupt and all other
     errors have the exit code 1, unless the error has an ``exit_code``. A closed pipe is not reported.
+
+    Args:
+        error: Exception that ends the program.
     """
     if is_interrupt(error):
         _print_error("interrupted")

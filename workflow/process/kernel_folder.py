@@ -46,7 +46,14 @@ def compilation_time(stages: Iterable[str], environment: Mapping[str, str] = os.
 
 
 def kernel_folder(environment: Mapping[str, str] = os.environ) -> Path | None:
-    """Return the folder of compiled kernels, which need not exist; None without a home."""
+    """Return the folder of compiled kernels, which need not exist.
+
+    Args:
+        environment: Variables by name, which give the folder or the home of the user.
+
+    Returns:
+        Path; None if there is neither.
+    """
     named = environment.get(VARIABLE)
     return Path(named) if named else _default_folder(environment)
 

@@ -240,7 +240,11 @@ def ending(code: int) -> str:
 
 
 def end_group(process: subprocess.Popen) -> None:
-    """End the process group of a program with SIGTERM, and with SIGKILL after ``GRACE`` seconds."""
+    """End a program and its descendants: SIGTERM to its process group, and SIGKILL after ``GRACE`` (5) seconds.
+
+    Args:
+        process: Running program that leads its process group.
+    """
     with suppress(ProcessLookupError):
         os.killpg(process.pid, signal.SIGTERM)
     try:

@@ -49,7 +49,12 @@ class MachineSpeed:
 
 
 def machine_speed() -> MachineSpeed | None:
-    """Return the measured slowness of this machine; None before the first measurement or if its file is damaged."""
+    """Return the measured slowness of this machine; None before the first measurement or if its file is damaged.
+
+    Returns:
+        Mean slowness (time of an element update over the time of the reference machine), slowness of each element
+        family, day of the measurement, and number of cores that other programs used.
+    """
     folder = kernel_folder()
     with suppress(OSError, ValueError, TypeError):
         if folder is not None:
@@ -58,13 +63,16 @@ def machine_speed() -> MachineSpeed | None:
 
 
 def slowness() -> float:
-    """Return the factor on times that the reference machine needs; one before the first measurement."""
+    """Return the time that this machine needs over the time of the reference machine; one if it is not yet measured."""
     speed = machine_speed()
     return 1.0 if speed is None else speed.slowness
 
 
 def measure_after(predicted: float) -> None:
-    """Measure the slowness after a shock, unless the shock was short or a measurement on an idle machine exists.
+    """Measure the slowness of this machine after a shock and store it in a file; takes up to some minutes.
+
+    Nothing is measured after a shock predicted below ``LONG`` (30 s), without a folder for the file, or if there
+    already is a measurement that other programs disturbed little. Errors are ignored.
 
     Args:
         predicted: Predicted wall time of the shock [s].

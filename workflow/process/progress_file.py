@@ -71,6 +71,9 @@ def read_progress(folder: Path) -> Progress | None:
 
     Args:
         folder: Folder that was given to ``write_progress_to``.
+
+    Returns:
+        Name of the current activity, completed share (0 to 1), and time since its start [s].
     """
     try:
         content = json.loads((folder / NAME).read_text(encoding="utf-8"))

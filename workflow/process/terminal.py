@@ -93,7 +93,7 @@ def print_error(text: str) -> None:
 
 @contextmanager
 def interruptible(what: str) -> Iterator[None]:
-    """Exit with code 1 on Ctrl-C in the block and print a note.
+    """Exit with code 1 and print a note if the user presses Ctrl-C in the ``with`` block.
 
     Args:
         what: Note to the user, such as how to continue.
@@ -150,9 +150,9 @@ class ProgressBar(Protocol):
 
 @contextmanager
 def progress_bar(description: str) -> Iterator[ProgressBar]:
-    """Show a transient progress bar with share, elapsed time and remaining time.
+    """Show a transient progress bar during a ``with`` block: share, elapsed time and remaining time.
 
-    Without a terminal, only the description is printed. ``status --follow`` shows it in a second terminal.
+    Without a terminal, only the description is printed. ``status --follow`` shows the bar in a second terminal.
 
     Args:
         description: Name of the activity.

@@ -56,7 +56,10 @@ class CarriedReflow:
 
 
 def records() -> tuple[type, ...]:
-    """Return the dataclasses that the files of jobs and results of this module's functions may contain, for reading."""
+    """Return the dataclasses that may occur in the files of jobs and results of ``carry`` and ``finish``.
+
+    Only these types are created when such a file is read by another process.
+    """
     from reflowshock.particles.core.geometry import JointGeometry
     from reflowshock.particles.scenes.carried_joint import Carried
     from reflowshock.particles.steps.shape import JointShape, Snapshot
@@ -143,6 +146,10 @@ def finish(job: CarriedReflow, _progress: Callable[[float], None]) -> "JointShap
 
     Args:
         job: Solder, and files of the joint after its first reflow and at the end, which are read.
+        _progress: Not used; functions of the pool take it.
+
+    Returns:
+        Particles, free surface, history and metrics of the joint at the end.
     """
     from reflowshock.particles.scenes.carried_joint import carried_shape
 

@@ -247,6 +247,9 @@ def start(geometries: "Sequence[JointGeometry]", solder: Solder, modes: "RigidMo
         geometries: Geometries of the joints between the pads of the structure without solder.
         solder: Solder of one joint.
         modes: Free rigid motions of the package, with the force of gravity along each.
+
+    Returns:
+        State with zero wrenches, rigid motions of the package, and no exchange.
     """
     from reflowshock.particles.scenes.carried_joint import stiffness_estimate
 

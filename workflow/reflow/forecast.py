@@ -30,6 +30,9 @@ def load_steps(thermal: Thermal) -> list[LoadStep]:
     Heating divides the range from the reference to the peak into equal steps; cooling takes the same steps in reverse.
     Melting and solidification are separate load steps.
 
+    Args:
+        thermal: Temperatures [K], number of steps, and motion of the die's corner over temperature.
+
     Returns:
         Temperature [K] and displacement of the die's corner [m] of each step.
     """
@@ -64,6 +67,10 @@ class HeatedForecast:
 
 def forecast_heated(case: "PackageCase", thermal: Thermal) -> HeatedForecast:
     """Predict load steps, effects, and number of exchanges between solder and structure of a coupled reflow.
+
+    Args:
+        case: Case of a package.
+        thermal: Temperatures of the case.
 
     Returns:
         Decision on each effect, load steps with liquid solder, and total number of exchanges.

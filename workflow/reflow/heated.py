@@ -127,11 +127,14 @@ def _no_loads(structure: "HeatedStructure") -> tuple[np.ndarray, np.ndarray]:
 
 
 def all_inputs(case: PackageCase, pads: "list[PadSite]") -> tuple:
-    """Return everything on which a saved coupled reflow depends: tables of the case, pads, and a digest of the sources.
+    """Return everything on which a saved coupled reflow depends, so that it continues only if nothing has changed.
 
     Args:
         case: Case of a package.
         pads: Pad table.
+
+    Returns:
+        Tuple of tables of the case, pads, and a digest of the sources.
     """
     folders = (Path(__file__).parent, Path(statics.__file__).parent)
     sources = digest_of_files(*(path for folder in folders for path in sorted(folder.glob("*.py"))))

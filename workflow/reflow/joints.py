@@ -31,7 +31,10 @@ class JointReflow:
 
 
 def records() -> tuple[type, ...]:
-    """Return the dataclasses that the files of jobs and results of this module's functions may contain, for reading."""
+    """Return the dataclasses that may occur in the files of jobs and results of this module's functions.
+
+    Only these types are created when such a file is read by another process.
+    """
     from reflowshock.particles.core.geometry import JointGeometry
     from reflowshock.particles.steps.shape import JointShape, Snapshot
 

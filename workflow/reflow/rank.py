@@ -46,7 +46,11 @@ class ProgressReporter:
 
 
 def name_of(work: Callable) -> str:
-    """Return the name of a module-level function, "module:function", by which another process can import it."""
+    """Return the name "module:function" of a module-level function, by which another process can import it.
+
+    Args:
+        work: The function.
+    """
     return f"{work.__module__}:{work.__qualname__}"
 
 
@@ -58,10 +62,13 @@ def function_of(name: str) -> Callable:
 
 
 def records_of(work: Callable) -> tuple[type, ...]:
-    """Return the types that the files of jobs and results may contain, as listed by the module of the function.
+    """Return the types that may occur in the files of jobs and results of a function.
 
     Args:
-        work: Function of a module that has a function ``records``.
+        work: Function that runs jobs; its module lists the types by a function ``records``.
+
+    Returns:
+        ``JobResult`` and the types of the module; only these are created when a file is read.
     """
     return (JobResult, *sys.modules[work.__module__].records())
 

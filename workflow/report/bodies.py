@@ -29,6 +29,9 @@ def body_group(
         chosen: Mask of the selected cells, shape (c,).
         values: Cell values of each field, shape (k, c); a vertex gets the mean over its faces.
         style: Further attributes of ``Group``, such as ``colour``.
+
+    Returns:
+        Vertices, faces, displacements and values of the fields at the k times, as one group of a scene.
     """
     faces, cell = boundary(series.cells[chosen])
     part = series.fields["part"][0][chosen].astype(np.int64)[cell]
@@ -67,7 +70,7 @@ def exaggeration(length: float, deflection: float) -> float:
 
 
 def round_down(factor: float) -> float:
-    """Round down to 1, 2 or 5 times a power of ten."""
+    """Round a positive number down to 1, 2 or 5 times a power of ten."""
     power = 10.0 ** np.floor(np.log10(factor))
     return float(max(step * power for step in (1.0, 2.0, 5.0) if step * power <= factor))
 

@@ -30,7 +30,11 @@ def colour_at(share: float, scale: Sequence[str] = tuple(SCALES["sequential"])) 
 
 
 def ink_on(colour: str) -> str:
-    """Return black or white, whichever is more legible on a colour."""
+    """Return black or white as ``#rrggbb``, whichever is more legible on a colour.
+
+    Args:
+        colour: Colour of the background, ``#rrggbb``.
+    """
     red, green, blue = _channels(colour)
     return "#000000" if 0.3 * red + 0.6 * green + 0.1 * blue > 127.0 else "#ffffff"
 

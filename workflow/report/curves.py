@@ -83,11 +83,11 @@ def difference_curves(histories: Histories, critical_joint: str) -> list[Chart]:
 
 
 def energy_curves(history: Mapping[str, NDArray]) -> list[Chart]:
-    """Return charts of the energies of one run and of its balance relative to the largest energy.
+    """Return two charts of one run over time: its energies, and its energy balance relative to the largest energy.
 
     Args:
-        history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity;
-            energies in J.
+        history: Arrays of ``history.npz``: ``time``, shape (k,) [s], and energies such as ``kinetic`` and ``internal``,
+            shape (k,) [J].
 
     Returns:
         Interactive charts for the report page.

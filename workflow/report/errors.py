@@ -55,7 +55,17 @@ class Discretisation:
 
 
 def scheme_share(name: str, results: Mapping[str, Mapping[str, Any]]) -> float | None:
-    """Return the relative difference of a figure between the first mode and one model on the same mesh, if known."""
+    """Return the relative difference of a metric between a two-scale run and one model on the same mesh (DNS).
+
+    Args:
+        name: Name of the metric.
+        results: Mode -> content of its ``result.json``, of which ``metrics`` is read; the first mode is compared with
+            the second.
+
+    Returns:
+        Magnitude of the difference over the value of the DNS; 0 for a DNS alone; None if only one other mode was run,
+        the DNS ended early, or a value is missing.
+    """
     if len(results) < 2 or _ends_early(results):
         return 0.0 if list(results) == ["dns"] else None
     ours, theirs = (result["metrics"].get(name, {"value": None})["value"] for result in list(results.values())[:2])

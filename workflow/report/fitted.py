@@ -16,7 +16,7 @@ Histories = Mapping[str, Mapping[str, "NDArray"]]
 
 
 def gauge_table(gauges: "Mapping[str, StrainGauge]", metrics: Mapping[str, Any], lengths: Mapping[str, float]) -> dict:
-    """Return the table of peak strain and strain rate of each gauge; empty without gauges.
+    """Return the table of peak strain and strain rate of each strain gauge.
 
     Args:
         gauges: Gauges by name.
@@ -24,7 +24,8 @@ def gauge_table(gauges: "Mapping[str, StrainGauge]", metrics: Mapping[str, Any],
         lengths: Length of each gauge in the model [m].
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text); an empty dict without gauges.
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per gauge: name, face, position,
+        direction, length [mm], peak strain [µm/m] and strain rate [1/s]; an empty dict without gauges.
     """
     rows = []
     for name, gauge in gauges.items():

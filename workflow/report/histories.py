@@ -75,10 +75,13 @@ def unsettled(history: Arrays, longest: float) -> str:
 
 
 def late_peak(history: Arrays) -> str:
-    """Return a warning if the peel or elastic von Mises stress peaks at the end of the run; else empty.
+    """Return a warning if a joint stress peaks in the last fiftieth of the run, so that a longer run may exceed it.
 
     Args:
         history: Arrays of ``history.npz``: ``time``, shape (k,) [s], ``joints`` (names), and k rows of each quantity.
+
+    Returns:
+        Sentence on the peel stress or, unless solder has yielded, the von Mises stress; empty if neither peaks late.
     """
     names = {PEEL: "peel", VON_MISES: "von Mises"}
     largest = {names[measure]: measure.worse(history).max(axis=1) for measure in settling_measures(history)}
@@ -93,5 +96,9 @@ def late_peak(history: Arrays) -> str:
 
 
 def peaks_late(values: NDArray) -> bool:
-    """Return whether a history, shape (times,), is largest in the last fiftieth of the run."""
+    """Return whether a history is largest in the last fiftieth of the run, so that a longer run may exceed it.
+
+    Args:
+        values: Samples in time, shape (times,).
+    """
     return bool(np.argmax(values) >= len(values) - max(2, len(values) // 50))

@@ -68,7 +68,8 @@ def mode_table(modes: Sequence[Mapping]) -> dict:
         modes: Records with ``mode`` (number), ``frequency`` [Hz] and ``mass_fraction`` by axis "x", "y", "z".
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text).
+        Table with ``head`` (column titles) and ``rows`` (lists of text): mode, frequency [Hz], and effective mass along
+        x, y and z [%].
     """
     rows = [
         [

@@ -91,8 +91,8 @@ def limited_metrics(metrics: dict, health: dict, text: Text) -> dict:
         text: Function of name and record of a metric that returns its text.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text); the limit is empty for a metric without a
-        check.
+        Table with ``head`` (column titles) and ``rows`` (lists of text): metric, value and limit, which is empty for a
+        metric without a check.
     """
     rows = []
     for name, metric in metrics.items():
@@ -118,8 +118,8 @@ def versions() -> dict:
     """Return the table of installed versions of the numerical libraries.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text); the version of a missing library is "not
-        found".
+        Table with ``head`` (column titles) and ``rows`` (lists of text): library and version, "not found" if it is
+        missing.
     """
     rows = []
     for name in PACKAGES:
@@ -147,14 +147,15 @@ def comparison(metrics: dict) -> dict | None:
 
 
 def energies(histories: dict[str, dict]) -> dict:
-    """Return the table of the largest magnitude of each energy in time, one column for each mode.
+    """Return the table of the largest magnitude of each energy over time, one column for each mode.
 
     Args:
         histories: Mode -> arrays of its ``history.npz``: ``time``, shape (k,) [s], and k rows of each quantity, among
             them the energies [J].
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text).
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per energy (kinetic, internal,
+        plastic, …, balance) [mJ]; some that are zero are left out.
     """
     terms = ("kinetic", "internal", "plastic", "hourglass", "damping", "external", "interface", "balance")
     largest = {
@@ -175,10 +176,11 @@ def models(results: dict[str, dict]) -> dict:
     """Return the table of model sizes and time steps, one column for each mode.
 
     Args:
-        results: Mode -> content of its ``result.json`` (``model``, ``metrics``, ``health``, ``timings``, ``coupling``).
+        results: Mode -> content of its ``result.json``, of which ``model`` is read.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text).
+        Table with ``head`` (column titles) and ``rows`` (lists of text), one row per property: hexahedra, nodes, MPI
+        ranks, tied nodes, time steps, masses, and critical time step of each material role.
     """
     records = [result["model"] for result in results.values()]
     rows = [[label, *(text(record) for record in records)] for label, text in MODEL_ROWS]
@@ -191,10 +193,10 @@ def models(results: dict[str, dict]) -> dict:
 
 
 def costs(results: dict[str, dict]) -> dict:
-    """Return the table of wall times [s] of each activity, one column for each run.
+    """Return the table of wall times [s], one row per activity and one column per run.
 
     Args:
-        results: Mode or solver -> content of its ``result.json``, of which ``timings`` is read.
+        results: Mode or solver -> content of its ``result.json``, of which ``timings`` (activity -> time [s]) is read.
 
     Returns:
         Table with ``head`` (column titles) and ``rows`` (lists of text).

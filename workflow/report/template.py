@@ -57,18 +57,18 @@ def template_environment(folder: Path) -> jinja2.Environment:
 
 @cache
 def script() -> Markup:
-    """Return the JavaScript that draws charts and scenes, to be inserted into a page."""
+    """Return the JavaScript, as safe HTML text, that draws charts and scenes in a page."""
     return Markup("\n".join((ASSETS / name).read_text(encoding="utf-8") for name in SCRIPTS))
 
 
 @cache
 def style() -> Markup:
-    """Return the CSS of a page, to be inserted into it."""
+    """Return the CSS of a page, as safe HTML text."""
     return Markup("\n".join((ASSETS / name).read_text(encoding="utf-8") for name in STYLES))
 
 
 def policy() -> str:
-    """Return the content security policy of a page: only its own script and style run."""
+    """Return the content security policy of a page as text: browsers run only its own script and style."""
     return f"default-src 'none'; script-src {_digest(script())}; style-src {_digest(style())}; img-src data:"
 
 

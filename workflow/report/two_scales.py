@@ -35,7 +35,8 @@ def two_scales(coupling: Record, model: Record, found_by: str = "") -> dict:
         found_by: How a coarse run selected the fine joints; empty without one.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text): name and value.
+        Table with ``head`` (column titles) and ``rows`` (lists of text) of name and value: scheme with its reason,
+        direction, fine joints or layers, window, step ratio, meso share, interface nodes, errors of the self-check.
     """
     scheme, joints = coupling.get("scheme"), coupling.get("fine_joints")
     rows = [
@@ -55,13 +56,14 @@ def two_scales(coupling: Record, model: Record, found_by: str = "") -> dict:
 
 
 def levels(coupling: Record) -> dict | None:
-    """Return the table of step levels; level 0 has the window, the time between exchanges; None without levels.
+    """Return the table of step levels of a two-scale run, from the window (level 0) inwards.
 
     Args:
         coupling: Entry ``coupling`` of a ``result.json``; ``levels`` lists ``step`` [s], ``elements``, ``cost_share``.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text); None without levels.
+        Table with ``head`` (column titles) and ``rows`` (lists of text): level, time step, number of hexahedra and
+        share of the cost; None without levels.
     """
     rows = [
         [str(level), nano(record["step"]), number(record["elements"]), _share(record.get("cost_share")) or "–"]
@@ -93,11 +95,12 @@ def placement(coupling: Record) -> dict | None:
 
 
 def oracle(seconds: float, results: Sequence[Record]) -> str:
-    """Return sentences that compare the cost of the two-scale run with one implicit model.
+    """Return sentences that compare the processor time of a two-scale run with one model with implicit steps.
 
     Args:
         seconds: Predicted time of the implicit run on one rank [s].
-        results: Contents of ``result.json`` of the two-scale run and, if there was one, of the preceding coarse run.
+        results: Contents of ``result.json`` of the two-scale run and, if there was one, of the preceding coarse run;
+            ``timings`` and ``model`` are read.
     """
     core_seconds = sum(result["timings"]["windows"] * result["model"]["ranks"] for result in results)
     runs = "the two-scale run" if len(results) == 1 else "the two-scale run and the preceding coarse run"

@@ -98,7 +98,10 @@ class OscillationCase(Case):
 
 
 def check_drop(case: DropCase) -> list[Problem]:
-    """Find contradictions between the parameters of a drop.
+    """Find contradictions between the parameters of a drop: its scene (size, wall, particles) and its solder.
+
+    Args:
+        case: Case of a drop at rest.
 
     Returns:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
@@ -109,7 +112,10 @@ def check_drop(case: DropCase) -> list[Problem]:
 
 
 def check_joint(case: JointCase) -> list[Problem]:
-    """Find contradictions between the parameters of a joint.
+    """Find contradictions between the parameters of a joint: pads, volume, motion of the package, and solder.
+
+    Args:
+        case: Case of a single joint.
 
     Returns:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
@@ -120,7 +126,10 @@ def check_joint(case: JointCase) -> list[Problem]:
 
 
 def check_drops(case: DropsCase) -> list[Problem]:
-    """Find contradictions between the parameters of two drops.
+    """Find contradictions between the parameters of two drops: their scene and their solder.
+
+    Args:
+        case: Case of two drops that merge or stay apart.
 
     Returns:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
@@ -131,7 +140,10 @@ def check_drops(case: DropsCase) -> list[Problem]:
 
 
 def check_oscillation(case: OscillationCase) -> list[Problem]:
-    """Find parameters with which a drop would not oscillate.
+    """Find parameters with which a drop would not oscillate, such as too much viscosity.
+
+    Args:
+        case: Case of an oscillating drop.
 
     Returns:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.

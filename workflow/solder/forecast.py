@@ -50,7 +50,10 @@ class SolderForecast:
 
 
 def forecast_solder(case: Case) -> SolderForecast:
-    """Predict effects, size, time step and cost of a scene of solder alone (drop, joint, drops), without running it.
+    """Predict effects, size, time step and cost of a scene of solder alone, without running it.
+
+    Args:
+        case: Case of a drop, a joint, two drops or an oscillating drop.
 
     Returns:
         Effects, number and spacing of the particles, scheme and its reason, time steps, wall time by stage [s].
@@ -160,6 +163,9 @@ FORECASTS: dict[str, Callable[[Any], SolderForecast]] = {
 def solder_size(case: Case) -> Size:
     """Predict wall times and memory of the stages of a case.
 
+    Args:
+        case: Case of a drop, a joint, two drops or an oscillating drop.
+
     Returns:
         Seconds by stage, number of joints (1), and memory [B].
     """
@@ -168,7 +174,12 @@ def solder_size(case: Case) -> Size:
 
 
 def solder_tables(_case: Case, forecast: SolderForecast) -> Iterator[RenderableType]:
-    """Yield the table of particles, scheme and time steps that ``plan`` prints, and a line on the assumed speed."""
+    """Yield the table of particles, scheme and time steps that ``plan`` prints, and a line on the assumed speed.
+
+    Args:
+        _case: Case of the forecast; not used.
+        forecast: Forecast by ``forecast_solder``.
+    """
     table = new_table("\nReflow", "quantity", "value", "remark")
     table.add_row("particles", f"{forecast.particles}", f"{1e6 * forecast.spacing:.3g} µm initial spacing")
     table.add_row("scheme", forecast.scheme, SCHEMES[forecast.scheme] + (f"; {forecast.why}" if forecast.why else ""))

@@ -27,7 +27,7 @@ HEADLINE = (
 
 
 def add_solder(run_folder: Path, case: SolderCase, context: dict, summary: dict) -> None:
-    """Add the section of a body at rest to the context of the report.
+    """Add the section of a body of solder at rest to the context of the report: headline, metrics, charts, scene.
 
     Args:
         run_folder: Run folder with the products.
@@ -47,11 +47,12 @@ def add_solder(run_folder: Path, case: SolderCase, context: dict, summary: dict)
 
 
 def add_oscillation(run_folder: Path, _case: OscillationCase, context: dict, summary: dict) -> None:
-    """Add the section of an oscillating drop to the context of the report.
+    """Add the section of an oscillating drop to the context of the report: headline, table of metrics, charts, scene.
 
     Args:
         run_folder: Run folder with the products.
-        context: Context of the page's template, changed in place.
+        _case: Not used; all functions that add sections take the case.
+        context: Context of the page's template, changed in place: ``headline``, ``tables``, ``curves``, ``scenes``.
         summary: Content of ``summary.json``.
     """
     shape, _ = _add_body(run_folder, context, summary)

@@ -80,7 +80,7 @@ def read_mark(folder: Path) -> dict[str, str] | None:
 
 @contextmanager
 def lock_folder(folder: Path, what: str, name: str, force: bool = False) -> Iterator[int]:
-    """Create and mark a folder and hold its lock, which the system releases when this process ends.
+    """Create and mark a folder and hold its lock during a ``with`` block; the system releases it if the process ends.
 
     Args:
         folder: The folder.
@@ -118,7 +118,11 @@ def lock_folder(folder: Path, what: str, name: str, force: bool = False) -> Iter
 
 
 def is_busy(folder: Path) -> bool:
-    """Return whether a process holds the lock of a folder."""
+    """Return whether a process holds the lock of a folder, that is, computes in it.
+
+    Args:
+        folder: Folder of a run or study.
+    """
     try:
         descriptor = os.open(folder / LOCK, os.O_RDONLY)
     except OSError:
@@ -134,6 +138,9 @@ def is_busy(folder: Path) -> bool:
 
 def remove_program_files(folder: Path) -> list[str]:
     """Remove store, logs, mark and lock of a folder, and the folder itself if it is then empty and not in use.
+
+    Args:
+        folder: Folder of a run or study; all other files stay.
 
     Returns:
         Names of the remaining entries.

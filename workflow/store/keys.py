@@ -23,16 +23,27 @@ class Change:
 
 
 def stage_inputs(case: Case, stage: Stage) -> dict:
-    """Return the inputs of a stage: dotted key -> SI value, and for input files ``<key>.sha256`` -> digest."""
+    """Return the inputs of a stage: its parameters and the digests of its input files.
+
+    Args:
+        case: Case with all parameters.
+        stage: Stage of the case's pipeline.
+
+    Returns:
+        Dotted key -> SI value, and for input files ``<key>.sha256`` -> digest.
+    """
     contents = [(f"{key}.sha256", _digest(path)) for key, path in case.files.items()]
     return {key: value for key, value in [*_flat(case.model_dump(mode="json")), *contents] if stage.depends_on(key)}
 
 
 def product_keys(case: Case) -> dict[str, str]:
-    """Return the product key of each stage; equal keys mean equal products.
+    """Return the product key of each stage of a case; equal keys mean equal products.
 
     A key is a digest of the parameters of the stage and of all upstream stages, and of the program version. The names
     of case and scale enter only the key of the report.
+
+    Args:
+        case: Case with all parameters; its input files are read.
 
     Returns:
         Name of each stage -> key, hexadecimal digits.
@@ -44,10 +55,10 @@ def product_keys(case: Case) -> dict[str, str]:
 
 
 def product_key(case: Case, stage: Stage, inputs: dict, follows: Sequence[str | None]) -> str:
-    """Return the key of a product.
+    """Return the key of a product, a digest of all its inputs: parameters, input files and upstream products.
 
     Args:
-        case: The case.
+        case: Case of the product; its name enters only the key of the report.
         stage: Stage that makes the product.
         inputs: Parameters of the stage, as returned by ``stage_inputs``.
         follows: Product keys of the stages that it follows, in order.
@@ -60,7 +71,14 @@ def product_key(case: Case, stage: Stage, inputs: dict, follows: Sequence[str | 
 
 
 def inputs_digest(case: Case) -> str:
-    """Return the SHA-256, hexadecimal, of all parameters and input files of a case that its stages depend on."""
+    """Return one digest of all parameters and input files of a case that its stages depend on.
+
+    Args:
+        case: Case with all parameters; its input files are read.
+
+    Returns:
+        SHA-256 as hexadecimal text.
+    """
     return digest_of({stage.name: stage_inputs(case, stage) for stage in case.pipeline.stages})
 
 

@@ -61,7 +61,11 @@ def publish(made: Path, product: Path) -> None:
 
 
 def discard(path: Path) -> None:
-    """Remove a file, folder or link of the store if it exists; targets of links stay."""
+    """Remove a file, folder or link of the store if it exists; targets of links stay.
+
+    Args:
+        path: Path to remove; a missing one is not an error.
+    """
     if path.is_symlink() or not path.is_dir():
         path.unlink(missing_ok=True)
     else:
@@ -114,7 +118,11 @@ def content_digest(record: dict) -> str:
 
 
 def file_digest(path: Path) -> str:
-    """Return the SHA-256 of a file; unchanged files are read only once per process."""
+    """Return the SHA-256 of a file as hexadecimal text; unchanged files are read only once per process.
+
+    Args:
+        path: File to read.
+    """
     status = path.stat()
     identity, state = (status.st_dev, status.st_ino), (status.st_size, status.st_ctime_ns)
     if (cached := _digests.get(identity)) is not None and cached[0] == state:

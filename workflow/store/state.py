@@ -31,9 +31,13 @@ class StageState:
 
 
 def examine(store: Store, point: Point) -> dict[str, StageState]:
-    """Return the state of each stage, in order, by checking every file of every product.
+    """Return the state of each stage, in order, by checking every file of every product; nothing is changed.
 
     An intact product stays valid when an upstream product is rebuilt with the same content.
+
+    Args:
+        store: Store: the folder of all products of a run or study.
+        point: Case with its settings.
 
     Returns:
         Name of a stage -> whether it has to run, and why: missing, damaged files, changed parameters, upstream stages.
@@ -96,7 +100,7 @@ def failed_checks(store: Store, point: Point, until: str) -> list[str]:
     """List the failed health checks of stages as messages; a stage without a record counts as failed.
 
     Args:
-        store: Store of the products.
+        store: Store: the folder of all products of a run or study.
         point: Point to check.
         until: Last stage to check.
     """

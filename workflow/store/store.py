@@ -130,7 +130,10 @@ def reads(products: Mapping[str, Path], case: Case, stage: Stage) -> dict[str, s
 
 
 def read_case_table(folder: Path) -> dict:
-    """Return the table of the case of a run folder.
+    """Return the case of a run folder as a nested table in SI units, from the file in its store.
+
+    Args:
+        folder: Run folder.
 
     Raises:
         CaseError: the folder is not a run folder, or its case is damaged.

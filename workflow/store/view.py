@@ -34,7 +34,7 @@ def show(store: Store, point: Point, stages: Iterable[str], companions: Companio
     """Link the products of some stages of a point into its run folder and remove all other links.
 
     Args:
-        store: Store of the products.
+        store: Store: the folder of all products of a run or study.
         point: Point of the run folder.
         stages: Stages whose products exist and are intact.
         companions: Folder in the run folder -> companion and its intact stages.
@@ -95,7 +95,15 @@ def _recognised(store: Store, folder: Path) -> dict[str, Link]:
 
 
 def shown_records(store: Store, point: Point) -> dict[str, dict]:
-    """Return the records (content of ``stage.json``) of the products that a run folder links, by stage name."""
+    """Return the records of the products that a run folder shows.
+
+    Args:
+        store: Store: the folder of all products of a run or study.
+        point: Case with its settings, which determines the run folder.
+
+    Returns:
+        Stage name -> content of its ``stage.json``; stages without a product are left out.
+    """
     sources = {name: link.source for name, link in list_program_files(store, store.run_folder(point)).items()}
     source_by_stage = {stage.name: sources.get(stage.record) for stage in point.case.pipeline.stages}
     records = {name: read_record((store.home / source).parent) for name, source in source_by_stage.items() if source}
@@ -124,7 +132,12 @@ def adopt(store: Store, folder: Path, made: Path) -> None:
 
 
 def altered_files(store: Store, folder: Path) -> list[str]:
-    """List missing or modified files of the program in a run folder as messages."""
+    """List missing or modified files of the program in a run folder as messages; empty if all are intact.
+
+    Args:
+        store: Store of the products, with the digests of the files.
+        folder: Run folder.
+    """
     return [
         f"{folder / name} {'was modified' if os.path.lexists(folder / name) else 'is missing'}"
         for name, link in list_program_files(store, folder).items()
@@ -133,7 +146,11 @@ def altered_files(store: Store, folder: Path) -> list[str]:
 
 
 def remove_all_links(store: Store) -> None:
-    """Remove all files of the program from the run folders of a store, and then empty folders; products stay."""
+    """Remove all files of the program from the run folders of a store, and then empty folders; products stay.
+
+    Args:
+        store: Store of a run or study.
+    """
     for folder in _folders(store):
         for name, link in list_program_files(store, folder).items():
             _remove_link(store, folder, name, link)
@@ -143,7 +160,10 @@ def remove_all_links(store: Store) -> None:
 
 
 def remove_unused(store: Store) -> tuple[int, int]:
-    """Remove products that no run folder links, and interrupted work.
+    """Remove products that no run folder shows, and work folders of interrupted stages.
+
+    Args:
+        store: Store of a run or study.
 
     Returns:
         Number of removed products, and number of removed work folders.

@@ -35,7 +35,7 @@ def name_case(verdict: Verdict) -> str:
 
 
 def show_sample(sample: Sample) -> None:
-    """Print the results of the random cases of a trial and its missed cases.
+    """Print the results of the random cases of one file: their numbers, and the cases outside of their bounds.
 
     Args:
         sample: Random cases of one file, with their results.
@@ -48,7 +48,9 @@ def show_sample(sample: Sample) -> None:
 
 
 def sample_summary(sample: Sample) -> str:
-    """Return a summary of the random cases of a trial as one line: numbers of cases, misses and refusals.
+    """Return one line on the random cases of one file: numbers of cases, misses and refusals.
+
+    A miss is a case outside of its bounds; a refusal is a case that the program rejects before it runs.
 
     Args:
         sample: Random cases of one file, with their results.

@@ -127,10 +127,14 @@ def cost_ratio(folders: Mapping[str, Path]) -> dict:
 
 
 def read_history(folder: Path) -> dict[str, NDArray]:
-    """Return the arrays of a solver's ``history.npz`` by name, such as ``time`` and ``displacement@<watch point>``.
+    """Return the arrays that a solver wrote to ``history.npz``.
 
     Args:
         folder: Folder of the solver.
+
+    Returns:
+        Name -> array: ``time``, shape (k,) [s], and k rows of each quantity, such as ``displacement@<watch point>``,
+        shape (k, 3) [m].
     """
     with np.load(folder / "history.npz") as arrays:
         return dict(arrays)
@@ -248,7 +252,11 @@ def bars_of(case: StructureCase, reference: BarWave) -> exact_bar.Bars:
 
 
 def layers_of(case: StructureCase) -> exact_layers.Layers:
-    """Return all layers of a case as a layered bar with its exact solution."""
+    """Return all layers of a case as a layered bar with its exact solution for a stress wave.
+
+    Args:
+        case: Case of a structure.
+    """
     from reflowshock.materials.elasticity import elasticity_matrix
 
     materials = case.problem.layer_materials.values()
@@ -260,7 +268,10 @@ def layers_of(case: StructureCase) -> exact_layers.Layers:
 
 
 def truncated_waves(case: StructureCase) -> Iterator[Problem]:
-    """Yield a problem for each layered bar whose compared waves have not half passed at the end of the run.
+    """Yield a problem for each layered bar whose run ends before half a pulse has passed the watch points.
+
+    Args:
+        case: Case of a structure with its references; only references to layered bars are checked.
 
     Yields:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
@@ -291,7 +302,14 @@ def strip_of(case: StructureCase, reference: Cantilever) -> exact_cantilever.Str
 
 
 def wave_points(reference: BarWave | LayeredBar) -> list[str]:
-    """Return the names of the three watch points of a bar, the lowest first: two incident ones, the transmitted one."""
+    """Return the names of the three watch points of a bar, the lowest first.
+
+    Args:
+        reference: Reference solution of a bar with its watch points.
+
+    Returns:
+        Two points for the incident and reflected wave, and one for the transmitted wave.
+    """
     return [*reference.incident, reference.transmitted]
 
 

@@ -65,6 +65,9 @@ class StructureForecast:
 def forecast_structure(case: StructureCase) -> StructureForecast:
     """Predict sizes, time steps and cost of a run, without running it.
 
+    Args:
+        case: Case of a structure.
+
     Returns:
         Effects, size and critical step of each layer, time step and cost of each solver, wall time by stage [s].
     """
@@ -111,11 +114,11 @@ def forecast_coupled(case: StructureCase, layers: Mapping[str, LayerForecast], u
 
 
 def critical_step(case: StructureCase, layers: Mapping[str, LayerForecast]) -> float:
-    """Return the predicted critical time step of the explicit scheme with damping, over all elements [s].
+    """Predict the critical time step of the explicit scheme with damping, the smallest of all layers [s].
 
     Args:
-        case: Case of a structure.
-        layers: Size and critical step of each layer by name; mass-scaled layers are left out.
+        case: Case of a structure, with its damping and mass scaling.
+        layers: Number of elements and critical step of each layer by name; mass-scaled layers are left out.
     """
     from reflowshock.fem.estimates.estimate import damped_critical_step
 
@@ -145,6 +148,9 @@ def forecast_steps(case: StructureCase, layers: Mapping[str, LayerForecast]) -> 
 def step_problems(case: StructureCase) -> Iterator[Problem]:
     """Yield problems of time steps: undefined, too many, above the critical step, or windows longer than a pulse.
 
+    Args:
+        case: Case of a structure; a window is the time between two exchanges of its models.
+
     Yields:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
     """
@@ -173,11 +179,11 @@ def step_problems(case: StructureCase) -> Iterator[Problem]:
 
 
 def shorter_than_window(case: StructureCase, window: float) -> Iterator[Problem]:
-    """Yield problems of pulses that are shorter than the coupling window [s].
+    """Yield problems of load pulses that are shorter than the coupling window.
 
     Args:
-        case: Case of a structure.
-        window: Length of the coupling window [s].
+        case: Case of a structure with its loads.
+        window: Length of the coupling window, the time between two exchanges of the models [s].
 
     Yields:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; nothing for a valid case.
@@ -193,7 +199,14 @@ def shorter_than_window(case: StructureCase, window: float) -> Iterator[Problem]
 
 
 def forecast_layers(case: StructureCase) -> dict[str, LayerForecast]:
-    """Predict the number of elements and the critical time step [s] of every layer, by its name."""
+    """Predict the size of the mesh of every layer of a structure.
+
+    Args:
+        case: Case of a structure.
+
+    Returns:
+        Name of a layer -> number of elements and critical time step [s].
+    """
     import numpy as np
 
     from reflowshock.fem.elements.box_step import box_element_step
@@ -229,10 +242,13 @@ def added_mass(case: StructureCase, layers: Mapping[str, LayerForecast]) -> floa
 
 
 def structure_size(case: StructureCase) -> Size:
-    """Predict wall times and memory of a case.
+    """Predict wall times and memory of the stages of a case.
+
+    Args:
+        case: Case of a structure.
 
     Returns:
-        Seconds by stage, 1 as number of joints, and memory [B].
+        Seconds by stage, number of joints (1), and memory [B].
     """
     outlook = forecast_structure(case)
     elements = sum(layer.elements for layer in outlook.layers.values())
@@ -241,13 +257,25 @@ def structure_size(case: StructureCase) -> Size:
 
 
 def structure_tables(case: StructureCase, outlook: StructureForecast) -> Iterator[RenderableType]:
-    """Yield the tables of ``plan``: elements and critical step of the layers; steps, cost and memory of the solvers."""
+    """Yield the tables that ``plan`` prints: elements and critical steps of layers; steps, cost and memory of solvers.
+
+    Args:
+        case: Case of a structure.
+        outlook: Forecast by ``forecast_structure``.
+    """
     yield layers_table(outlook)
     yield solvers_table(case, outlook)
 
 
 def layers_table(outlook: StructureForecast) -> Table:
-    """Return a table with one row per layer, top first, and the total: elements, critical step and material."""
+    """Return a table for the terminal with one row per layer, top first, and the total.
+
+    Args:
+        outlook: Forecast by ``forecast_structure``.
+
+    Returns:
+        Table of elements, critical step and material.
+    """
     table = new_table("\nLayers, top first", "layer", "elements", "critical step", "material")
     for name, layer in reversed(outlook.layers.items()):
         remark = "; mass scaled to the smallest step of the others" if layer.mass_scaled else ""
@@ -257,9 +285,14 @@ def layers_table(outlook: StructureForecast) -> Table:
 
 
 def solvers_table(case: StructureCase, outlook: StructureForecast) -> Table:
-    """Return a table of step, number of steps, cost and memory: explicit, implicit and, if coupled, two models.
+    """Return a table for the terminal of the solvers, with a caption that recommends one.
 
-    Its caption recommends a solver.
+    Args:
+        case: Case of a structure.
+        outlook: Forecast by ``forecast_structure``.
+
+    Returns:
+        Table of step, number of steps, cost and memory: explicit, implicit and, if coupled, the two-scale run.
     """
     table = new_table("\nSolvers, on one core", "solver", "step", "steps", "cost", "memory", "remark")
     numerics, forecast = case.dynamics.numerics, outlook.solvers

@@ -10,6 +10,9 @@ from reflowshock.workflow.structure.references import reference_problems
 def structure_problems(case: StructureCase) -> list[Problem]:
     """Check materials, positions, facet sets, loads, references and time steps of a structure against each other.
 
+    Args:
+        case: Case whose values are valid one by one.
+
     Returns:
         One ``Problem`` (dotted key, message, value, allowed values) for each error found; empty for a valid case.
     """

@@ -49,10 +49,13 @@ def acceleration_curves(case: StructureCase, histories: Histories, styles: Mappi
 
 
 def input_spectra(case: StructureCase) -> list[Chart]:
-    """Return a chart of the shock response spectra of all input accelerations of a run; empty without inputs.
+    """Return the chart of the shock response spectra of all input accelerations of a run.
+
+    Args:
+        case: Case of a structure with its loads.
 
     Returns:
-        Interactive charts for the report page.
+        List of one interactive chart for the report page; empty without input accelerations.
     """
     from reflowshock.fem.loads.structure_pulses import pulses_of
 

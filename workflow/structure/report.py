@@ -110,18 +110,22 @@ def add_two_scales(result: Mapping, context: dict) -> None:
 
 
 def meshed_part(case: StructureCase) -> str:
-    """Return the meshed part of the body: "half", "quarter", or empty for the whole body."""
+    """Return the part of the body that symmetry leaves to be meshed: "half", "quarter", or empty for the whole body.
+
+    Args:
+        case: Case of a structure with its symmetry planes.
+    """
     return ("", "half", "quarter")[len(set(case.structure.symmetry))]
 
 
 def headline(metrics: dict) -> list[dict]:
-    """Return the figures at the top of the page: the first metric of each quantity.
+    """Return the figures at the top of the page: for each quantity of ``HEADLINE`` the first metric of the run.
 
     Args:
-        metrics: Name -> record with ``value`` (SI) and ``unit``.
+        metrics: Name -> record with ``value`` (SI) and ``unit``; names are ``<quantity>`` or ``<quantity>@<location>``.
 
     Returns:
-        Records with ``label`` and ``value`` as text.
+        Records with ``label`` and ``value`` as text; quantities without a metric are left out.
     """
     figures = []
     for quantity_name in HEADLINE:
@@ -154,7 +158,7 @@ def text(name: str, metric: dict) -> str:
 
 
 def metric_table(metrics: dict) -> dict:
-    """Return a table of all metrics.
+    """Return a table of all metrics: readable name, and value with its unit.
 
     Args:
         metrics: Name -> record with ``value`` (SI) and ``unit``.
@@ -166,14 +170,14 @@ def metric_table(metrics: dict) -> dict:
 
 
 def reference_table(metrics: dict) -> dict | None:
-    """Return a table of computed and exact values with errors, or None without exact values.
+    """Return the table of computed and exact values, or None without exact values.
 
     Args:
         metrics: Name -> record with ``value`` (SI) and ``unit``; a value ``x`` with an exact one has ``x_exact`` and
             ``x_error``.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text); None without exact values.
+        Table with ``head`` (column titles) and ``rows`` (lists of text): quantity, computed, exact value and error [%].
     """
     rows = []
     for name, metric in metrics.items():
@@ -184,14 +188,15 @@ def reference_table(metrics: dict) -> dict | None:
 
 
 def published_table(case: StructureCase, metrics: dict) -> dict | None:
-    """Return a table of computed and published values, or None without published values.
+    """Return the table of computed and published values, or None without published values.
 
     Args:
         case: Case with its references.
         metrics: Name -> record with ``value`` (SI) and ``unit``.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text); None without published values.
+        Table with ``head`` (column titles) and ``rows`` (lists of text): quantity, computed and published value,
+        source.
     """
     rows = [
         [
@@ -207,14 +212,13 @@ def published_table(case: StructureCase, metrics: dict) -> dict | None:
 
 
 def model_table(results: Mapping[str, dict]) -> dict:
-    """Return a table of model size and time steps with one column per solver.
+    """Return the table of model size and time steps, one row per property and one column per solver.
 
     Args:
-        results: Solver -> content of its ``result.json`` (``model``, ``metrics``, ``health``, ``timings``,
-            ``coupling``).
+        results: Solver -> content of its ``result.json``, of which ``model`` is read.
 
     Returns:
-        Table with ``head`` (column titles) and ``rows`` (lists of text).
+        Table with ``head`` (column titles) and ``rows`` (lists of text): elements, nodes, ranks, time steps, masses.
     """
     records = [result["model"] for result in results.values()]
     return {

@@ -119,7 +119,7 @@ def run_study(points: Points, store: Store, machine: Machine, *, force: bool = F
 
     Args:
         points: Points of the study.
-        store: Store of the products.
+        store: Store: the folder of all products of a run or study.
         machine: Resources for the computation.
         force: Whether the folder may hold another study.
 
@@ -166,8 +166,8 @@ def results(points: Points, store: Store, failed: dict[str, str]) -> list[Row]:
 
     Args:
         points: Points of the study, possible and impossible ones.
-        store: Store of the products.
-        failed: Key of a point -> reason of its failure.
+        store: Store of the products, from which summaries are read.
+        failed: Key of a point (name of its run folder) -> reason of its failure.
 
     Returns:
         Number, key, settings, verdict, message, wall time [s] and metrics of each point.
@@ -186,7 +186,7 @@ def warn_of_metrics(points: Points, store: Store, first: Point) -> None:
 
     Args:
         points: Points with their study, whose metrics are named in its file.
-        store: Store of the products.
+        store: Store: the folder of all products of a run or study.
         first: The first complete point.
     """
     show_products(store, first)
@@ -203,9 +203,16 @@ def warn_of_metrics(points: Points, store: Store, first: Point) -> None:
 
 
 def has_metrics(study: Study, rows: Sequence[Row]) -> bool:
-    """Return whether the points have all metrics of a study, and print the missing ones.
+    """Check that the points of a study have all its metrics, and print the missing ones.
 
-    The ranking metric must be a number.
+    The metric by which points are ranked must be a number.
+
+    Args:
+        study: Study, which names its metrics.
+        rows: Results of the points.
+
+    Returns:
+        Whether every metric exists in at least one point, or no point has any metric.
     """
     available = _metrics_of(study, rows)
     unavailable = [name for name in study.metrics if available and name not in available]

@@ -43,7 +43,11 @@ DIGITS = 6
 
 
 def as_text(value: object) -> str:
-    """Write a TOML value in the form of ``--set``: names, quantities and dates without quotes."""
+    """Write a TOML value in the form of ``--set``: names, quantities and dates without quotes.
+
+    Args:
+        value: Value as ``tomllib`` returns it.
+    """
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False) if _is_toml(value) else value
     return json.dumps(value, ensure_ascii=False, default=str)

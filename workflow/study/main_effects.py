@@ -72,12 +72,17 @@ class MainEffect:
 
 
 def select_measured(rows: Sequence[Row], metric: str) -> list[Row]:
-    """Return the rows in which the metric with the name ``metric`` is a finite number, in their order."""
+    """Return the results in which a metric is a finite number, in their order.
+
+    Args:
+        rows: Results of the points of a study.
+        metric: Name of the metric.
+    """
     return [row for row in rows if is_number(row.metrics.get(metric, {"value": None})["value"])]
 
 
 def is_number(value: object) -> bool:
-    """Return whether the value of a metric is a finite number."""
+    """Return whether the value of a metric is a finite number; texts, None and nan are not."""
     return isinstance(value, float | int) and not isinstance(value, bool) and bool(np.isfinite(value))
 
 
@@ -106,7 +111,7 @@ def effect_of(factor: Factor, rows: Sequence[Row], metric: str) -> MainEffect:
 
 
 def rank_parameters(rows: Sequence[Row], metric: str, goal: str) -> list[Row]:
-    """Return the healthy rows in which a metric is a number, the best first.
+    """Return the results of healthy points in which a metric is a number, the best first.
 
     Args:
         rows: Results of the points.

@@ -78,6 +78,9 @@ def main_effects(effects: Sequence[tuple[str, str, Sequence[MainEffect]]]) -> Fi
 
     Args:
         effects: Metric, its unit and its main effects; each item is a row of panels.
+
+    Returns:
+        Figure of Matplotlib with one row of panels per metric and one panel per factor.
     """
     columns = max(len(row) for _, _, row in effects)
     with pyplot.rc_context(STYLE):
@@ -96,7 +99,11 @@ def main_effects(effects: Sequence[tuple[str, str, Sequence[MainEffect]]]) -> Fi
 
 
 def axis_title(effect: MainEffect) -> str:
-    """Return the title of a factor's axis in two lines, table and key, with the unit of its values."""
+    """Return the title of a chart axis for a varied factor, in two lines: table and key, with the unit of its values.
+
+    Args:
+        effect: Main effect of the factor.
+    """
     table, _, name = effect.factor.keys[0].rpartition(".")
     return f"{table}\n{name} [{spelled(effect.unit)}]" if effect.unit else f"{table}\n{name}"
 

@@ -25,8 +25,8 @@ def progress_reporter(
     the number of parallel jobs stays the same.
 
     Args:
-        store: Store of the products.
-        points: All points.
+        store: Store: the folder of all products of a run or study.
+        points: All points of the study (cases with their settings).
         jobs: Missing products.
         bar: Progress bar.
         at_first: Function that is called once, with the first complete point.
@@ -99,7 +99,7 @@ def forecast_stages(points: Sequence[Point], jobs: Sequence[Job]) -> list[StageF
     """Predict the products of a study and their cost, stage by stage.
 
     Args:
-        points: All points.
+        points: All points of the study (cases with their settings).
         jobs: Missing products.
 
     Returns:

@@ -47,14 +47,17 @@ class Row:
 
 
 def row_of(number: int, store: Store, point: Point, keys: Sequence[str], failure: str | None) -> Row:
-    """Return the row of a point.
+    """Return the row of a point, from the summary of its run or from the message of its failure.
 
     Args:
-        number: Number of the point in the study.
-        store: Store of its products.
-        point: Point.
-        keys: Varied keys.
+        number: Number of the point in the study, from 1.
+        store: Store of its products, from which ``summary.json`` is read.
+        point: Case with its settings.
+        keys: Dotted keys that the study varies.
         failure: Message of its failure; None if the point is complete.
+
+    Returns:
+        Number, key, varied settings, verdict ("healthy", "unhealthy", "failed"), message, wall time [s] and metrics.
     """
     texts = display_values(point.case)
     settings = {key: texts.get(key, point.settings[key]) for key in keys}
@@ -74,12 +77,15 @@ def row_of(number: int, store: Store, point: Point, keys: Sequence[str], failure
 
 
 def columns(rows: Sequence[Row], study: Study) -> dict[str, list[Value]]:
-    """Return the results by column; the name ends with the unit in brackets, metrics are in SI units.
+    """Return the results of a study by column, for its CSV and Parquet tables.
 
-    Columns on points have names that differ from all metrics, since metrics include ``verdict`` and ``seconds``.
+    Args:
+        rows: Results of the points.
+        study: Study with its varied keys.
 
     Returns:
-        Column title -> value of each row, None where it is missing.
+        Column title -> value of each row, None where it is missing. The columns are number and key of the point, varied
+        parameters, result, message, wall time, report, and metrics in SI units; titles end with the unit in brackets.
     """
     metrics = dict.fromkeys((name, metric["unit"]) for row in rows for name, metric in row.metrics.items())
     table: dict[str, list[Value]] = {"number": [row.number for row in rows], "point": [row.key for row in rows]}

@@ -90,7 +90,13 @@ class Study:
 
 
 def read_study(path: Path) -> Study:
-    """Read and check a study file, without its case.
+    """Read and check a study file (TOML), without its case.
+
+    Args:
+        path: Study file.
+
+    Returns:
+        Study with its case file, design (factors and settings of each point), metrics and goal.
 
     Raises:
         CaseError: The file is invalid; the error lists all problems.

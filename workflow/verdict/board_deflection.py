@@ -68,7 +68,17 @@ def allowed_deflection(board: Board, seat: Seat, axis: int, constant: float) -> 
 
 
 def position_factor(board: Board, at: tuple[float, float]) -> float | None:
-    """Return r = sin(pi x / a) sin(pi y / b) at a position between the outermost holes; None outside of them."""
+    """Return Steinberg's factor r = sin(pi x / a) sin(pi y / b) at a position between the outermost mounting holes.
+
+    a and b are the distances of these holes along x and y, and x and y are measured from the first of them.
+
+    Args:
+        board: Board with its mounting holes.
+        at: Coordinates (x, y) of the component on the board [m].
+
+    Returns:
+        Factor, at most 1; None for a position that is not between the holes.
+    """
     shares = [
         (place - lines[0]) / span for place, lines, span in zip(at, board.hole_lines, spans(board), strict=True) if span
     ]
@@ -128,10 +138,13 @@ class BoardDeflection(Criterion):
 
 
 def seats(case: BoardDropCase) -> list[Seat]:
-    """Return the package, and the further packages that can be compared with the deflection below it.
+    """Return the components whose survival can be judged by the deflection of the board below the package.
 
-    Their factors r need the deflection of the board's centre, so they are compared only if the package is there, and
-    only between the holes.
+    These are the package and the further packages. Their position factors need the deflection of the board's centre, so
+    the others are compared only if the package is there, and only between the holes.
+
+    Args:
+        case: Case of a board drop.
 
     Returns:
         Name, sides along x and y [m] and position factor of each component, the package first.

@@ -120,19 +120,28 @@ class Criterion(ABC):
 
 
 def worst(judgements: Iterable[Judgement]) -> Judgement | None:
-    """Return the judgement (value and limit) with the smallest margin of those that apply; None if none applies."""
+    """Return the judgement with the smallest margin, the ratio of limit and value; None if no criterion applies.
+
+    Args:
+        judgements: Value and limit of each criterion; those that do not apply are skipped.
+    """
     applying = [judgement for judgement in judgements if judgement.applies]
     return min(applying, key=lambda judgement: judgement.rank, default=None)
 
 
 def value_text(value: float, unit: str) -> tuple[str, str]:
-    """Return a value with three digits in a usual unit, and this unit; strains in microstrain."""
+    """Return a value as text with three digits in a usual unit, and this unit; strains in microstrain.
+
+    Args:
+        value: Value in SI units.
+        unit: SI unit, "m/m" for strains; empty for ratios.
+    """
     factor, display_unit = (1e6, "µm/m") if unit == "m/m" else SHOWN.get(unit, (1.0, unit))
     return f"{factor * value:.3g}", display_unit
 
 
 def margin_text(margin: float) -> str:
-    """Return a margin as text with two digits; it is a ratio to the limit, and below 1 the limit is violated."""
+    """Return a margin as text with two digits; it is a ratio of limit and value, and below 1 the limit is violated."""
     return f"{margin:.2g}" if margin < 99.5 else f"{margin:.0f}"
 
 

@@ -16,6 +16,9 @@ from reflowshock.workflow.verdict.joint_limits import life_of
 def verdict_of(drop: JudgedDrop) -> dict[str, Any]:
     """Judge a drop by all criteria.
 
+    Args:
+        drop: Histories, metrics and limits of a drop that was run.
+
     Returns:
         Record of the verdict. ``design`` is the verdict on the package and ``criterion`` the name of the criterion that
         decides it, None if none applies. ``criteria`` is the list of ``Judgement.record``. ``joints`` contains the
