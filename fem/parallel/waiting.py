@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from mpi4py import MPI
 
 TESTING = 1e-4  # [s] a sleep takes about as long
-YIELDING = 5e-4  # [s] since the start of the wait
+YIELDING = 2e-4  # [s] since the start of the wait
 SHORTEST_PAUSE, LONGEST_PAUSE = 5e-5, 2e-3  # [s]
 PAUSE_SHARE = 0.05  # of the time waited so far, so that a pause hardly prolongs a wait
 
