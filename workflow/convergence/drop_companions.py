@@ -17,7 +17,7 @@ from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.store.companions import COARSEST, HALF_WINDOW, SIZES, size_name
 
 LEAST_END = 0.5  # least duration of one model, over that of two, for an error of two scales
-CHEAP = 0.25  # largest cost of one model on the coarsest mesh, over that of the shock of the run
+CHEAP = 0.3  # largest cost of one model on the coarsest mesh, over that of the shock of the run
 
 
 def drop_companions(case: BoardDropCase, shock: Path | None) -> dict[str, BoardDropCase]:
@@ -82,10 +82,16 @@ def drop_sizes(_case: BoardDropCase, _shock: Path) -> dict[str, float]:
 
 
 def _for_two_scales(case: BoardDropCase, coarsest: BoardDropCase) -> dict[str, BoardDropCase]:
-    """Return the coarsest companion with one model if that is cheap, otherwise a companion with half the window."""
-    one_model = with_values(coarsest, {"shock.numerics.modes": ("dns",)})
-    if _core_seconds(one_model) <= CHEAP * _core_seconds(case):
-        return {COARSEST: with_values(coarsest, {"shock.numerics.modes": ("two_scale", "dns")})}
+    """Return the coarsest companion with one model if that is cheap, otherwise a companion with half the window.
+
+    One model runs until the end if that is cheap, otherwise for a part of the time. Half the window shows only the
+    error of the coupling in time, not that of coarse joints.
+    """
+    most = CHEAP * _core_seconds(case)
+    for duration in (None, LEAST_END * float(coarsest.shock.duration)):
+        early = with_values(coarsest, {"shock.numerics.dns_duration": duration})
+        if _core_seconds(with_values(early, {"shock.numerics.modes": ("dns",)})) <= most:
+            return {COARSEST: with_values(early, {"shock.numerics.modes": ("two_scale", "dns")})}
     fraction = coarsest.shock.numerics.step_fraction
     return {HALF_WINDOW: with_values(coarsest, {"shock.numerics.step_fraction": 0.5 * fraction})}
 

@@ -213,7 +213,7 @@ def _compared(run_folder: Path, main: Path) -> tuple[Path, Path, str] | str:
     if failed := _failure(run_folder, HALF_WINDOW):
         return failed
     halved = first_model(companion_folder(run_folder, HALF_WINDOW) / UNTIL)
-    return coarsest, halved, f"change by half the window, {companion_title(COARSEST)}"
+    return coarsest, halved, f"change by half the window without that by coarse parts, elements x {SIZES[-1]:g}"
 
 
 def _has_two_scales(results: Path) -> bool:

@@ -14,7 +14,7 @@ from reflowshock.workflow.store.companions import COARSEST, HALF_WINDOW, SIZES, 
 from reflowshock.workflow.structure.case import StructureCase
 
 FEWEST = 4  # smallest number of elements along an axis that companions coarsen
-CHEAP = 0.25  # largest cost of one model on the coarsest mesh, over that of the shock of the run
+CHEAP = 0.3  # largest cost of one model on the coarsest mesh, over that of the shock of the run
 
 
 def structure_companions(case: StructureCase, _shock: Path | None) -> dict[str, StructureCase]:

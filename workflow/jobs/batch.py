@@ -276,7 +276,7 @@ def _run(store: Store, jobs: Sequence[Job], machine: Machine, lock: int) -> None
         prepare(store, job)
     write_jobs(store, jobs, machine)
     if machine.live and any(job.is_of_companion for job in jobs):
-        console.print("the same drop with larger elements, for its errors …")
+        console.print("the same case with larger elements, for its errors …")
     follow = machine.each_second
     if machine.live and machine.slurm:
         follow = JobOutput([log_of(store, job.point, job.stage) for job in jobs]).show

@@ -48,10 +48,15 @@ class Discretisation:
                 "discretisation": self.errors.get(name),
                 "order": self.orders.get(name),
                 "two_scale": self.two_scale.get(name, scheme_share(name, results)),
-                "how": f"{how}; two scales: {self.two_scale_how}" if self.two_scale_how else how,
+                "how": how + self._two_scale_origin(name),
             }
             for name, how in self.how.items()
         }
+
+    def _two_scale_origin(self, name: str) -> str:
+        """Return the origin of the error of two scales of a metric, or why that of all metrics is unknown, as text."""
+        applies = bool(self.two_scale_how) and (name in self.two_scale or not self.two_scale)
+        return f"; two scales: {self.two_scale_how}" if applies else ""
 
 
 def scheme_share(name: str, results: Mapping[str, Mapping[str, Any]]) -> float | None:
@@ -67,7 +72,7 @@ def scheme_share(name: str, results: Mapping[str, Mapping[str, Any]]) -> float |
         the DNS ended early, or a value is missing.
     """
     if len(results) < 2 or _ends_early(results):
-        return 0.0 if list(results) == ["dns"] else None
+        return None
     ours, theirs = (result["metrics"].get(name, {"value": None})["value"] for result in list(results.values())[:2])
     is_number = isinstance(ours, int | float) and isinstance(theirs, int | float)
     return abs(ours / theirs - 1.0) if is_number and theirs else None

@@ -237,7 +237,7 @@ def test_half_the_window_gives_the_error_of_two_scales_without_one_model(tmp_pat
     shock_of(companion_folder(tmp_path, HALF_WINDOW) / "shock", 2.5)
     error = estimated(tmp_path)["peak_board_strain"]
     assert error["two_scale"] == pytest.approx(0.2)
-    assert error["two_scale_how"] == "change by half the window, elements x 2"
+    assert error["two_scale_how"] == "change by half the window without that by coarse parts, elements x 2"
 
 
 def test_a_missing_companion_leaves_the_errors_unknown(tmp_path):
@@ -254,6 +254,7 @@ def test_one_model_on_the_coarsest_mesh_runs_only_where_it_is_cheap(monkeypatch)
     monkeypatch.setattr("reflowshock.workflow.convergence.drop_companions.CHEAP", 2.0)
     cheap = drop_companions(alone, None)
     assert HALF_WINDOW not in cheap and cheap[COARSEST].shock.numerics.modes == ("two_scale", "dns")
+    assert cheap[COARSEST].shock.numerics.dns_duration is None
     assert list(drop_companions(drop('shock.numerics.modes=["dns"]'), None)) == list(map(size_name, SIZES))
 
 
@@ -300,3 +301,11 @@ def test_a_structure_with_an_exact_solution_has_no_companions(tmp_path):
     assert discretisation(tmp_path, case).record({}) == {
         "tip_deflection_error": {"discretisation": 0.01, "order": None, "two_scale": None, "how": "exact solution"}
     }
+
+
+def test_one_model_runs_for_half_of_the_time_where_all_of_it_is_too_dear():
+    case = read_case(SMALL_CASE.parents[2] / "cases/jedec_bga/case.toml")
+    assert isinstance(case, BoardDropCase)
+    shock = drop_companions(case, None)[COARSEST].shock
+    assert shock.numerics.modes == ("two_scale", "dns")
+    assert shock.numerics.dns_duration == pytest.approx(0.5 * float(shock.duration))
