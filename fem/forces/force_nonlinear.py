@@ -21,9 +21,8 @@ from reflowshock.fem.elements.hexahedron import HEXAHEDRON
 from reflowshock.fem.elements.stress import symmetric, von_mises
 from reflowshock.fem.errors import InvertedElementError
 from reflowshock.fem.forces.energy import Energy
+from reflowshock.fem.forces.lanes import Lanes, arrange
 from reflowshock.fem.forces.nonlinear_blocks import (
-    Lanes,
-    arrange,
     gauss_volumes,
     gradient_blocks,
     hexahedron_blocks,
@@ -88,7 +87,7 @@ class NonlinearElements:
         """
         elements = everything.subset(chosen)
         same, laws = merge_equal_materials(elements, plastic)
-        lanes, finite = arrange(same, same.material), path.finite
+        lanes, finite = arrange(same, same.material, LANES), path.finite
         blocks: AnyBlocks
         kernel: Callable[[NDArray[np.float64], NDArray[np.float64]], int]
         if elements.kind.name == HEXAHEDRON.name:

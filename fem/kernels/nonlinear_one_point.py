@@ -19,6 +19,18 @@ from numba import njit
 from numpy.typing import NDArray
 
 from reflowshock.fem.kernels.box_rotation import DEFORMATION, ROTATION, add_cross, spin, transform_corners
+from reflowshock.fem.kernels.hourglass_lanes import (
+    SHIFT,
+    SLOTS,
+    A,
+    B,
+    C,
+    D,
+    replace_by_turned_forces,
+    write_amplitudes,
+    write_mean_deformation,
+    write_resistance,
+)
 from reflowshock.fem.kernels.lanes import (
     LANE_OPTIONS,
     LANES,
@@ -45,18 +57,6 @@ from reflowshock.fem.kernels.nonlinear import (
 from reflowshock.fem.kernels.nonlinear_gradient import FINE
 from reflowshock.fem.kernels.plastic_lanes import add_work, law_of, plastic_flow
 from reflowshock.fem.kernels.plasticity import yield_stress
-from reflowshock.fem.kernels.turned_hexahedron import (
-    SHIFT,
-    SLOTS,
-    A,
-    B,
-    C,
-    D,
-    replace_by_turned_forces,
-    write_amplitudes,
-    write_mean_deformation,
-    write_resistance,
-)
 from reflowshock.materials.plasticity import FIRST_YIELD
 
 AMPLITUDES = 12 * LANES
