@@ -21,7 +21,7 @@ from reflowshock.fem.kernels.levels import (
     paced_forces_of,
     take_steps,
 )
-from reflowshock.fem.kernels.nonlinear import STATE_SLOTS, Path
+from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.nonlinear_hexahedron import HexahedronBlocks
 from reflowshock.fem.kernels.nonlinear_one_point import OnePointBlocks
 from reflowshock.fem.kernels.vectors.vector import WIDTH
@@ -43,8 +43,8 @@ NOTHING = ForceArrays(
     turning_boxes=(CELLS, NODES, NODES, _none_of(0, 30 * WIDTH)),
     turning=(CELLS, NODES, NODES, _none_of(0, 120 * WIDTH)),
     one_point=OnePointBlocks(
-        *(CELLS, NODES, NODES, NODES, _none_of(0, 9), _none_of(0, 6), _none_of(0, 120 * LANES), _none_of(0, 1, LANES)),
-        *(_none_of(0, 1, STATE_SLOTS), BY_LANE, BY_LANE, _none_of(0, 12 * LANES), _none_of(0)),
+        *(CELLS, NODES, NODES, NODES, _none_of(0, 9), _none_of(0, 6), _none_of(0, 120 * WIDTH), _none_of(0, 1, WIDTH)),
+        *(_none_of(0, 1, 13 * WIDTH), BY_LANE, BY_LANE, _none_of(0, 12 * WIDTH), _none_of(0)),
     ),
     hexahedron=HexahedronBlocks(
         *(CELLS, NODES, NODES, NODES, _none_of(0, 9), _none_of(0, 6), _none_of(0, 21 * LANES), _none_of(0, 9 * LANES)),

@@ -41,6 +41,10 @@ class Lanes:
         moved = values[self.pattern_shapes].transpose(0, 2, 3, 1)
         return np.ascontiguousarray(moved).reshape(*moved.shape[:2], -1)
 
+    def view(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return a view of values with the lanes as second axis, ``(n, width, ..., k)`` of ``(n, ..., width k)``."""
+        return np.moveaxis(values.reshape(*values.shape[:-1], -1, self.width), -1, 1)
+
     def nodes(self, elements: Elements) -> NDArray[np.int32]:
         """Return the nodes of the elements of each block, lanes innermost, shape (nb, k, width) int32."""
         return np.ascontiguousarray(elements.cells[self.element].transpose(0, 2, 1), dtype=np.int32)

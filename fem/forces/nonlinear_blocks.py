@@ -11,11 +11,10 @@ from reflowshock.fem.elements.tetrahedron import QUADRATIC_SHARE, TETRAHEDRON, T
 from reflowshock.fem.forces.force_congruent import SIGNS
 from reflowshock.fem.forces.lanes import Lanes
 from reflowshock.fem.kernels.hexahedron import GAUSS, GAUSS_DERIVATIVES
-from reflowshock.fem.kernels.lanes import LANES
-from reflowshock.fem.kernels.nonlinear import STATE_SLOTS, STRETCH
 from reflowshock.fem.kernels.nonlinear_gradient import Blocks
 from reflowshock.fem.kernels.nonlinear_hexahedron import POINT, HexahedronBlocks
 from reflowshock.fem.kernels.nonlinear_one_point import OnePointBlocks
+from reflowshock.fem.kernels.vectors.vector import WIDTH
 
 # Degree 2 (Hammer, Marlowe & Stroud 1956): exact for the stiffness of straight-edged 10-node tetrahedra.
 FOUR_POINTS = np.full((4, 4), (5.0 - np.sqrt(5.0)) / 20.0) + np.eye(4) / np.sqrt(5.0)
@@ -63,13 +62,13 @@ def gradient_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float6
         **_common_arrays(elements, lanes, plastic),
         gradient=lanes.spread(gradient.reshape(len(corners), points, -1)),
         weight=lanes.spread(weight[:, :, None]),
-        state=initial_state(len(lanes.filled), points, finite),
+        state=initial_state(lanes, points, finite),
         plastic_work=np.zeros(lanes.element.shape),
     )
 
 
 def one_point_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64], finite: bool) -> OnePointBlocks:
-    """Return stress-free one-point hexahedra in blocks of sixteen, the arguments of the nonlinear kernels.
+    """Return stress-free one-point hexahedra in blocks of ``WIDTH``, the arguments of the nonlinear kernels.
 
     Args:
         elements: Hexahedra of the one-point formulation.
@@ -83,10 +82,10 @@ def one_point_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float
         **_common_arrays(elements, lanes, plastic),
         constants=lanes.spread(hexahedron_constants(shapes)[:, None])[:, 0],
         weight=lanes.spread(volume[:, None, None]),
-        state=initial_state(len(lanes.filled), 1, finite),
+        state=initial_state(lanes, 1, finite),
         plastic_work=np.zeros(lanes.element.shape),
         hourglass_energy=np.zeros(lanes.element.shape),
-        slip=_written_zeros(len(lanes.filled), 12 * LANES),
+        slip=_written_zeros(len(lanes.filled), 12 * WIDTH),
         modulus=1.0 / np.linalg.inv(elements.elasticity)[:, 0, 0],
     )
 
@@ -213,18 +212,18 @@ def elastic_constants(elasticity: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.ascontiguousarray(elasticity[:, ORTHOTROPIC[0], ORTHOTROPIC[1]])
 
 
-def initial_state(blocks: int, points: int, finite: bool) -> NDArray[np.float64]:
-    """Return the stress-free state of elements in blocks of sixteen.
+def initial_state(lanes: Lanes, points: int, finite: bool) -> NDArray[np.float64]:
+    """Return the stress-free state of elements in blocks.
 
     Args:
-        blocks: Number of blocks nb.
+        lanes: Order of the elements.
         points: Number of integration points m of an element.
         finite: Whether strains are finite; the stretches of the state are then the identity, otherwise 0 and not used.
 
     Returns:
-        State, shape (nb, m, 208), entry k of element e at ``16 * k + e``: stress xx, yy, zz, xy, yz, xz [Pa],
+        State, shape (nb, m, 13 width), entry k of element e at ``width * k + e``: stress xx, yy, zz, xy, yz, xz [Pa],
         equivalent plastic strain, stretch in the order of the stress.
     """
-    state = _written_zeros(blocks, points, STATE_SLOTS)
-    state[:, :, STRETCH : STRETCH + 3 * LANES] = float(finite)
+    state = _written_zeros(len(lanes.filled), points, 13 * lanes.width)
+    state[:, :, 7 * lanes.width : 10 * lanes.width] = float(finite)
     return state

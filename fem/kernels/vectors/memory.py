@@ -180,3 +180,18 @@ def six(values, at):
 def nine(values, at):
     """Return nine vectors that follow each other in memory; ``values`` is a pointer, ``at`` the first position."""
     return six(values, at) + three(values, at + 6 * WIDTH)
+
+
+@njit(**VECTOR_OPTIONS)
+def put_three(values, at, vectors):
+    """Write three vectors one after the other; ``values`` is a pointer, ``at`` the first position."""
+    store(values, at, vectors[0])
+    store(values, at + WIDTH, vectors[1])
+    store(values, at + 2 * WIDTH, vectors[2])
+
+
+@njit(**VECTOR_OPTIONS)
+def put_six(values, at, vectors):
+    """Write six vectors one after the other; ``values`` is a pointer, ``at`` the first position."""
+    put_three(values, at, vectors[:3])
+    put_three(values, at + 3 * WIDTH, vectors[3:])

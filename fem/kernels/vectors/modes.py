@@ -23,6 +23,12 @@ def minus(a, b):
 
 
 @njit(**VECTOR_OPTIONS)
+def scaled(factor, a):
+    """Return a vector times a tuple (x, y, z) of vectors."""
+    return factor * a[0], factor * a[1], factor * a[2]
+
+
+@njit(**VECTOR_OPTIONS)
 def dot(a, b):
     """Return the scalar product of two tuples (x, y, z) of vectors, a vector."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
