@@ -1,8 +1,10 @@
 """Functions of vectors: choice, square root, logarithm and exponential, without branches.
 
-The logarithm and the exponential are those of ``kernels.plastic_lanes``, exact to a few units in the last place.
+The logarithm and the exponential are polynomials, exact to a few units in the last place: library functions take scalars.
+They are summed in pairs (Estrin), since each operation waits for the one before.
 """
 
+import math
 from typing import Any
 
 from llvmlite import ir
@@ -10,11 +12,14 @@ from numba import njit
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
-from reflowshock.fem.kernels.plastic_lanes import BIAS, LN2, MANTISSA, ROOT_BITS
 from reflowshock.fem.kernels.vectors.memory import broadcast
 from reflowshock.fem.kernels.vectors.vector import DOUBLES, VECTOR, VECTOR_OPTIONS, WIDTH, constant
 from reflowshock.materials.plasticity import LARGEST_EXPONENT
 
+LN2 = 0.6931471805599453
+ROOT_BITS = 0x3FE6A09E667F3BCD  # of sqrt(1/2): mantissas are taken from there to sqrt(2)
+MANTISSA, BIAS = 52, 1023
+FACTORS = tuple(1.0 / math.factorial(k) for k in range(13))
 LONGS = ir.VectorType(ir.IntType(64), WIDTH)
 
 
@@ -103,15 +108,11 @@ def log(x):
     k, m = split(x)
     s = (m - 1.0) / (m + 1.0)
     z = s * s
-    series = 1.0 / 19.0 + z * (1.0 / 21.0)
-    series = 1.0 / 17.0 + z * series
-    series = 1.0 / 15.0 + z * series
-    series = 1.0 / 13.0 + z * series
-    series = 1.0 / 11.0 + z * series
-    series = 1.0 / 9.0 + z * series
-    series = 1.0 / 7.0 + z * series
-    series = 1.0 / 5.0 + z * series
-    series = 1.0 / 3.0 + z * series
+    z2 = z * z
+    z4 = z2 * z2
+    low = 1.0 / 3.0 + z * (1.0 / 5.0) + z2 * (1.0 / 7.0 + z * (1.0 / 9.0))
+    middle = 1.0 / 11.0 + z * (1.0 / 13.0) + z2 * (1.0 / 15.0 + z * (1.0 / 17.0))
+    series = low + z4 * (middle + z4 * (1.0 / 19.0 + z * (1.0 / 21.0)))
     return k * LN2 + 2.0 * s * (1.0 + z * series)
 
 
@@ -127,18 +128,13 @@ def exp(x):
     x = within(x, broadcast(LARGEST_EXPONENT))
     k = nearest(x * (1.0 / LN2))
     r = x - k * LN2
-    series = 1.0 + r * (1.0 / 12.0)
-    series = 1.0 + r * series * (1.0 / 11.0)
-    series = 1.0 + r * series * (1.0 / 10.0)
-    series = 1.0 + r * series * (1.0 / 9.0)
-    series = 1.0 + r * series * (1.0 / 8.0)
-    series = 1.0 + r * series * (1.0 / 7.0)
-    series = 1.0 + r * series * (1.0 / 6.0)
-    series = 1.0 + r * series * (1.0 / 5.0)
-    series = 1.0 + r * series * (1.0 / 4.0)
-    series = 1.0 + r * series * (1.0 / 3.0)
+    r2 = r * r
+    r4 = r2 * r2
+    low = FACTORS[2] + r * FACTORS[3] + r2 * (FACTORS[4] + r * FACTORS[5])
+    middle = FACTORS[6] + r * FACTORS[7] + r2 * (FACTORS[8] + r * FACTORS[9])
+    series = low + r4 * (middle + r4 * (FACTORS[10] + r * FACTORS[11] + r2 * FACTORS[12]))
     power = power_of_two(k)
-    return power + power * (r + 0.5 * r * r * series)
+    return power + power * (r + r2 * series)
 
 
 @njit(**VECTOR_OPTIONS)

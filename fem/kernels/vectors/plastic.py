@@ -1,14 +1,20 @@
-"""Radial return at one point of a vector of elements; equation and Newton steps as in ``kernels.plastic_lanes``."""
+"""Radial return at one point of a vector of elements, without branches.
+
+The same equation and the same Newton steps in ln x as ``plasticity.plastic_increment``, all lanes together until the
+last one has converged.
+"""
 
 import numpy as np
 from numba import njit
 
-from reflowshock.fem.kernels.plastic_lanes import ABOVE, TINY
 from reflowshock.fem.kernels.plasticity import small_power
 from reflowshock.fem.kernels.vectors.functions import choose, exp, larger, log, rough_exp, rough_log, smaller
 from reflowshock.fem.kernels.vectors.memory import all_below, broadcast
 from reflowshock.fem.kernels.vectors.vector import VECTOR_OPTIONS
 from reflowshock.materials.plasticity import CONVERGED, ITERATIONS, SMALL_GROWTH
+
+TINY = 1e-300  # in the place of zero under a logarithm
+ABOVE = 1e-3  # of a ceiling over its rough logarithm: it only keeps steps from going far beyond
 
 
 @njit(**VECTOR_OPTIONS)
@@ -25,10 +31,10 @@ def law_at(plastic, material, step):
         count), and the increment of the plastic strain at the reference rate (then 1); six scalars.
     """
     k = 6 * np.int64(material)
-    reference = step * plastic[k + 5]
-    if 0.0 < reference < np.inf:
-        return plastic[k], plastic[k + 1], plastic[k + 2], plastic[k + 3], plastic[k + 4], reference
-    return plastic[k], plastic[k + 1], plastic[k + 2], plastic[k + 3], 0.0, 1.0
+    reference, sensitivity = step * plastic[k + 5], plastic[k + 4]
+    if not 0.0 < reference < np.inf:
+        reference, sensitivity = 1.0, 0.0
+    return plastic[k], plastic[k + 1], plastic[k + 2], plastic[k + 3], sensitivity, reference
 
 
 @njit(**VECTOR_OPTIONS)
@@ -39,7 +45,11 @@ def hardened_by(strain, law):
 
 @njit(**VECTOR_OPTIONS)
 def started(above, before, law):
-    """Return y = ln(x / reference) to start Newton's method with, and its upper bound; see ``plastic_lanes.start_flow``.
+    """Return y = ln(x / reference) to start Newton's method with, and its upper bound.
+
+    Without hardening within the step 3 G x + Y C y = q - Y. With y_r = (q - Y) / (C Y), where only the rate limits x,
+    and y_c, where only the stiffness does, y = y_r - W(y_r exp(y_r - y_c)); W is Lambert's function to 1 % (Iacono &
+    Boyd, Adv. Comput. Math. 43, 2017).
 
     Args:
         above: Trial von Mises stress above the static yield stress, a vector [Pa].
@@ -68,7 +78,7 @@ def plastic_strains(trial, strain, law):
     none, one = broadcast(0.0), broadcast(1.0)
     before = hardened_by(strain, law)
     above = trial - law[1] - before
-    if all_below(above, 1e-300):
+    if all_below(above, TINY):
         return none
     y, ceiling = started(above, before, law)
     inverse = one / larger(strain, broadcast(TINY))
