@@ -168,7 +168,7 @@ class TurningBlocks:
         Raises:
             InvertedElementError: An element is turned inside out.
         """
-        block = self.forces(*self.blocks, displacement, force)
+        block = self.forces(self.blocks, displacement, force)
         if block != UPRIGHT:
             raise self.inverted(block, displacement)
 
@@ -188,7 +188,7 @@ class TurningBlocks:
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return the strain energy."""
-        return _split_energies(self.energies(*self.blocks, displacement), self.hourglass)
+        return _split_energies(self.energies(self.blocks, displacement), self.hourglass)
 
 
 class CorotationalBlocks(TurningBlocks):

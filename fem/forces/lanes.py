@@ -88,7 +88,8 @@ def _blocks_of(
     members: dict[int, list[int]] = {}
     for element in chosen[np.argsort(node[chosen], kind="stable")].tolist():
         members.setdefault(int(shape[element]), []).append(element)
-    blocks, remaining = [], {count: [] for count in range(1, width)}
+    blocks: list[list[int]] = []
+    remaining: dict[int, list[list[int]]] = {count: [] for count in range(1, width)}
     for copies in members.values():
         whole = len(copies) - len(copies) % width
         blocks += _split(copies[:whole], width)

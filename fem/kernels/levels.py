@@ -165,12 +165,10 @@ def add_forces(arrays, displacement, force):
         if block >= 0:
             return 2, block
         subtract_lines(nodes, axes, lines[1], force)
-    cells, filled, pattern, constants = arrays.turning_boxes
-    block = add_turned_block_forces(cells, filled, pattern, constants, displacement, force)
+    block = add_turned_block_forces(arrays.turning_boxes, displacement, force)
     if block >= 0:
         return 3, block
-    cells, filled, pattern, constants = arrays.turning
-    block = add_turned_forces(cells, filled, pattern, constants, displacement, force)
+    block = add_turned_forces(arrays.turning, displacement, force)
     if block >= 0:
         return 4, block
     block = add_one_point_force(arrays.one_point, arrays.path, displacement, force)

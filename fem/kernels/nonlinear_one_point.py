@@ -332,9 +332,6 @@ def add_one_point_force(blocks, path, displacement, force):
         if not all_below(trial - section_limit(broadcast(law[1]), mises), 0.0):
             factor = slip_factor(trial, (mises, strain), law)
         resisting = move_hourglass((slips, energies, works), b, free, resisting, (factor, energy))
-        if finite:
-            p = nominal_stress(r, new, s, volume, moment_of(g, resisting))
-        else:
-            p = small_nominal_stress(s, volume)
+        p = nominal_stress(r, new, s, volume, moment_of(g, resisting)) if finite else small_nominal_stress(s, volume)
         subtract_modes(f, nodes, b, np.int64(blocks.filled[b]), forces_on_modes(k, at, r, p, resisting))
     return FINE

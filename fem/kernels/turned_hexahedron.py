@@ -1,4 +1,4 @@
-"""Numba kernels of corotational elastic hexahedra of any shape (finite rotations, small strains), in vectors of elements.
+"""Numba kernels of corotational elastic hexahedra of any shape (finite rotations, small strains), on vectors.
 
 As ``kernels.box_rotation``, with the mean gradients and the hourglass stiffness of each element. In the transformed
 nodal values q_p, p a parity of ``force_congruent``, the mean deformation is F = 1 + sum over p of q_p (x) b_p, and the
@@ -11,8 +11,9 @@ and the force its exact derivative: with P as in ``box_rotation`` and G_k = R (H
 D = P - sum over k of G_k (x) c_k; that on q_p is D b_p, of the four modes with G_k.
 
 The constants of a pattern of ``WIDTH`` elements, entry i of element e at ``WIDTH i + e``, are V C as in
-``vectors.corotational``, b_p of p = 1 to 7, c_k, then H in blocks of the modes: aa, bb, cc, dd with six entries each, ab,
-ac, ad, bc, bd, cd with nine. They are read in this order, and the next pattern is fetched meanwhile.
+``vectors.corotational``, b_p of p = 1 to 7, c_k, then H in blocks of the modes: aa, bb, cc, dd with six entries each,
+ab, ac, ad, bc, bd, cd with nine. They do not fit in the fast caches: each is read once, and the next pattern is fetched
+meanwhile.
 """
 
 import numpy as np
@@ -163,20 +164,20 @@ def forces_on_modes(k, at, r, p, f):
 
 
 @njit(**LANE_OPTIONS)
-def add_turned_forces(cells, filled, pattern, constants, displacement, force):
+def add_turned_forces(blocks, displacement, force):
     """Subtract the internal force of corotational elastic hexahedra of any shapes.
 
     Args:
-        cells: Nodes of blocks in tensor order, elements after the last one repeat it, shape (nb, 8, WIDTH) int32.
-        filled: Number of elements of each block, shape (nb,) int32.
-        pattern: Pattern of each block, shape (nb,) int32.
-        constants: Constants of each pattern (V C [J], b_p [1/m], c_k [m], H [N/m]), shape (np, 120 WIDTH).
+        blocks: Four arrays: nodes of blocks in tensor order, where elements after the last one repeat it, (nb, 8,
+            WIDTH) int32; number of elements of each block, (nb,) int32; its pattern, (nb,) int32; constants of each
+            pattern, (np, 120 WIDTH).
         displacement: Nodal displacement, shape (n, 3) [m].
         force: Nodal force, shape (n, 3) [N], subtracted from.
 
     Returns:
         ``UPRIGHT`` (-1), or the first block with an element that is turned inside out; then the force is not complete.
     """
+    cells, filled, pattern, constants = blocks
     nodes, k, u, f = place(cells), place(constants), place(displacement), place(force)
     for b in range(len(filled)):
         at = ENTRIES * np.int64(pattern[b])
@@ -195,11 +196,12 @@ def add_turned_forces(cells, filled, pattern, constants, displacement, force):
 
 
 @njit(**LANE_OPTIONS)
-def turned_energies(cells, filled, pattern, constants, displacement):
+def turned_energies(blocks, displacement):
     """Return the total energies of mean strains and of hourglass modes, two scalars [J].
 
     Arguments as in ``add_turned_forces``.
     """
+    cells, filled, pattern, constants = blocks
     nodes, k, u = place(cells), place(constants), place(displacement)
     mean = higher = 0.0
     for b in range(len(filled)):

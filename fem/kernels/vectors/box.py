@@ -75,20 +75,20 @@ def box_forces(k, at, q, r, e):
 
 
 @njit(**LANE_OPTIONS)
-def add_turned_block_forces(cells, filled, pattern, constants, displacement, force):
+def add_turned_block_forces(blocks, displacement, force):
     """Subtract the internal force of corotational boxes of any shapes.
 
     Args:
-        cells: Nodes of blocks in tensor order, boxes after the last one repeat it, shape (nb, 8, WIDTH) int32.
-        filled: Number of boxes of each block, shape (nb,) int32.
-        pattern: Pattern of each block, shape (nb,) int32.
-        constants: Constants of each pattern, shape (np, 30 WIDTH) [J, N/m, 1/m].
+        blocks: Four arrays: nodes of blocks in tensor order, where boxes after the last one repeat it, (nb, 8, WIDTH)
+            int32; number of boxes of each block, (nb,) int32; its pattern, (nb,) int32; constants of each pattern,
+            (np, 30 WIDTH).
         displacement: Nodal displacement, shape (n, 3) [m].
         force: Nodal force, shape (n, 3) [N], subtracted from.
 
     Returns:
         ``UPRIGHT`` (-1), or the first block with a box that is turned inside out; then the force is not complete.
     """
+    cells, filled, pattern, constants = blocks
     nodes, k, u, f = place(cells), place(constants), place(displacement), place(force)
     for b in range(len(filled)):
         at = ENTRIES * np.int64(pattern[b])
@@ -103,11 +103,12 @@ def add_turned_block_forces(cells, filled, pattern, constants, displacement, for
 
 
 @njit(**LANE_OPTIONS)
-def block_energies(cells, filled, pattern, constants, displacement):
+def block_energies(blocks, displacement):
     """Return the total energies of mean strains and of higher modes of boxes in blocks, two scalars [J].
 
     Arguments as in ``add_turned_block_forces``.
     """
+    cells, filled, pattern, constants = blocks
     nodes, k, u = place(cells), place(constants), place(displacement)
     mean = higher = 0.0
     for b in range(len(filled)):

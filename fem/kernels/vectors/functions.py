@@ -1,15 +1,15 @@
 """Functions of vectors: choice, square root, logarithm and exponential, without branches.
 
-The logarithm and the exponential are polynomials, exact to a few units in the last place: library functions take scalars.
-They are summed in pairs (Estrin), since each operation waits for the one before.
+The logarithm and the exponential are polynomials, because library functions take scalars; they are exact to a few units
+in the last place. They are summed in pairs (Estrin), since each operation waits for the one before.
 """
 
 import math
 from typing import Any
 
 from llvmlite import ir
-from numba import njit
-from numba.core import cgutils, types
+from numba import njit, types
+from numba.core import cgutils
 from numba.extending import intrinsic
 
 from reflowshock.fem.kernels.vectors.memory import broadcast

@@ -6,8 +6,8 @@ Arrays are passed on as pointers (``place``): Numba would count a reference to a
 from typing import Any
 
 from llvmlite import ir
-from numba import njit
-from numba.core import cgutils, types
+from numba import njit, types
+from numba.core import cgutils
 from numba.extending import intrinsic
 
 from reflowshock.fem.kernels.vectors.vector import DOUBLES, VECTOR, VECTOR_OPTIONS, WIDTH, constant, spread

@@ -1,8 +1,8 @@
 """Polar decomposition F = R (1 + E) of deformation gradients, for vectors of elements.
 
 With A = F^T F - 1, the rotation is R = F (1 + A)^(-1/2). Where A is small, the series of the inverse square root is
-evaluated by Horner's rule on polynomials a + b A + c A^2, since A^3 = i_1 A^2 - i_2 A + i_3 (Cayley and Hamilton); then E
-has no error of cancellation either. Otherwise Newton's iteration X -> (X + X^-T) / 2 (Higham 1986) starts from F.
+evaluated by Horner's rule on polynomials p + q A + r A^2, since A^3 = i_1 A^2 - i_2 A + i_3 (Cayley and Hamilton); E
+then has no error of cancellation either. Otherwise Newton's iteration X -> (X + X^-T) / 2 (Higham 1986) starts from F.
 """
 
 from numba import njit
@@ -59,35 +59,47 @@ def by_series(f, a):
     """
     minors = cofactor_symmetric(a)
     i1, i2 = a[0] + a[1] + a[2], minors[0] + minors[1] + minors[2]
-    i3 = a[0] * minors[0] + a[3] * minors[3] + a[5] * minors[5]
-    p, q, r = SERIES[8] * i3, SERIES[6] - SERIES[8] * i2, SERIES[7] + SERIES[8] * i1
-    p, q, r = times_a(p + SERIES[5], q, r, i1, i2, i3)
-    p, q, r = times_a(p + SERIES[4], q, r, i1, i2, i3)
-    p, q, r = times_a(p + SERIES[3], q, r, i1, i2, i3)
-    p, q, r = times_a(p + SERIES[2], q, r, i1, i2, i3)
-    p, q, r = times_a(p + SERIES[1], q, r, i1, i2, i3)
-    p, q, r = times_a(p + SERIES[0], q, r, i1, i2, i3)
-    s = polynomial(p, q, r, a, minors, i1, i2)
-    u, v, w = times_a(p, q, r, i1, i2, i3)
-    change = times(f, full(s))
+    i = i1, i2, a[0] * minors[0] + a[3] * minors[3] + a[5] * minors[5]
+    c = SERIES[8] * i[2], SERIES[6] - SERIES[8] * i2, SERIES[7] + SERIES[8] * i1
+    c = times_a(c, SERIES[5], i)
+    c = times_a(c, SERIES[4], i)
+    c = times_a(c, SERIES[3], i)
+    c = times_a(c, SERIES[2], i)
+    c = times_a(c, SERIES[1], i)
+    c = times_a(c, SERIES[0], i)
+    d, change = times_a(c, 0.0, i), times(f, full(polynomial(c, a, minors, i)))
     rotation = (
         f[0] + change[0], f[1] + change[1], f[2] + change[2],
         f[3] + change[3], f[4] + change[4], f[5] + change[5],
         f[6] + change[6], f[7] + change[7], f[8] + change[8],
     )  # fmt: skip
-    return rotation, polynomial(p + u, q + v + 1.0, r + w, a, minors, i1, i2)
+    return rotation, polynomial((c[0] + d[0], c[1] + d[1] + 1.0, c[2] + d[2]), a, minors, i)
 
 
 @njit(**VECTOR_OPTIONS)
-def times_a(p, q, r, i1, i2, i3):
-    """Return the coefficients of A (p + q A + r A^2), three vectors; i1, i2, i3: invariants of A."""
-    return r * i3, p - r * i2, q + r * i1
+def times_a(c, constant, i):
+    """Return the coefficients of A (p + q A + r A^2), three vectors.
+
+    Args:
+        c: Coefficients p, q, r, three vectors.
+        constant: Scalar that is added to p.
+        i: Invariants i_1, i_2, i_3 of A, three vectors.
+    """
+    p = c[0] + constant
+    return c[2] * i[2], p - c[2] * i[1], c[1] + c[2] * i[0]
 
 
 @njit(**VECTOR_OPTIONS)
-def polynomial(p, q, r, a, minors, i1, i2):
-    """Return p + q A + r A^2 as six vectors, with A^2 = i_1 A - i_2 + cof A; ``minors`` is cof A, six vectors."""
-    d, g = p - r * i2, q + r * i1
+def polynomial(c, a, minors, i):
+    """Return p + q A + r A^2 as six vectors, with A^2 = i_1 A - i_2 + cof A.
+
+    Args:
+        c: Coefficients p, q, r, three vectors.
+        a: Symmetric matrix A, six vectors xx, yy, zz, xy, yz, xz.
+        minors: Its cofactor matrix, six vectors.
+        i: Its invariants i_1, i_2, i_3, three vectors.
+    """
+    d, g, r = c[0] - c[2] * i[1], c[1] + c[2] * i[0], c[2]
     return (
         d + g * a[0] + r * minors[0],
         d + g * a[1] + r * minors[1],
