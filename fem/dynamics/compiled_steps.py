@@ -26,9 +26,10 @@ from reflowshock.fem.kernels.levels import (
     paced_forces_of,
     take_steps,
 )
-from reflowshock.fem.kernels.nonlinear import STATE_SLOTS, Path
+from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.nonlinear_hexahedron import HexahedronBlocks
 from reflowshock.fem.kernels.nonlinear_one_point import OnePointBlocks
+from reflowshock.fem.kernels.vectors.vector import WIDTH
 from reflowshock.fem.loads.load import Load
 from reflowshock.fem.model.body import Body
 
@@ -44,11 +45,11 @@ NOTHING = ForceArrays(
     congruent=(NODES, AXES, ROWS, _none_of(0, 8, 6), LINES),
     assembled=(_none_of(1, kind=np.int32), NODES, _none_of(0, 3, 3)),
     turning_rows=(NODES, AXES, ROWS, _none_of(0, 3), _none_of(0, 27), LINES),
-    turning_boxes=(CELLS, NODES, _none_of(0, 30 * LANES)),
-    turning=(CELLS, NODES, _none_of(0, 120 * LANES)),
+    turning_boxes=(CELLS, NODES, NODES, _none_of(0, 30 * WIDTH)),
+    turning=(CELLS, NODES, NODES, _none_of(0, 120 * WIDTH)),
     one_point=OnePointBlocks(
-        *(CELLS, NODES, NODES, NODES, _none_of(0, 9), _none_of(0, 6), _none_of(0, 120 * LANES), _none_of(0, 1, LANES)),
-        *(_none_of(0, 1, STATE_SLOTS), BY_LANE, BY_LANE, _none_of(0, 12 * LANES), _none_of(0)),
+        *(CELLS, NODES, NODES, NODES, _none_of(0, 9), _none_of(0, 6), _none_of(0, 120 * WIDTH), _none_of(0, 1, WIDTH)),
+        *(_none_of(0, 1, 13 * WIDTH), BY_LANE, BY_LANE, _none_of(0, 12 * WIDTH), _none_of(0)),
     ),
     hexahedron=HexahedronBlocks(
         *(CELLS, NODES, NODES, NODES, _none_of(0, 9), _none_of(0, 6), _none_of(0, 21 * LANES), _none_of(0, 9 * LANES)),

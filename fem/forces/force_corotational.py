@@ -9,26 +9,27 @@ Boxes are stored in rows of equal boxes, whose neighbours share operations, or i
 board of jedec_bga, with three boxes per row, blocks are 2.3 times as fast; from 24 boxes per row on, rows are faster.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.elements.element import Elements, classes, element_stiffness
+from reflowshock.fem.elements.element import Elements, element_stiffness
 from reflowshock.fem.errors import InvertedElementError
 from reflowshock.fem.forces.energy import Energy
 from reflowshock.fem.forces.force_congruent import align_boxes, arrange_in_rows, is_box, parity_blocks
-from reflowshock.fem.forces.nonlinear_blocks import hexahedron_constants, in_blocks
+from reflowshock.fem.forces.lanes import arrange
+from reflowshock.fem.forces.nonlinear_blocks import hexahedron_constants
 from reflowshock.fem.kernels.box_rotation import (
     UPRIGHT,
-    add_turned_block_forces,
     add_turned_row_forces,
-    block_energies,
     row_energies,
 )
 from reflowshock.fem.kernels.box_rows import PAD, read_lines, subtract_lines
 from reflowshock.fem.kernels.turned_hexahedron import add_turned_forces, turned_energies
+from reflowshock.fem.kernels.vectors.box import add_turned_block_forces, block_energies
+from reflowshock.fem.kernels.vectors.vector import WIDTH
 
 SHORT_ROWS = 8  # mean number of boxes per row below which blocks of any shapes are used
 NORMAL = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
@@ -114,13 +115,14 @@ class CorotationalBoxes:
 
 @dataclass(frozen=True, slots=True)
 class TurningBlocks:
-    """Corotational hexahedra in blocks of sixteen lanes; base class of boxes and other shapes.
+    """Corotational hexahedra in blocks of ``WIDTH`` lanes; base class of boxes and other shapes.
 
     Attributes:
         points: Nodes, shape (n, 3) [m].
-        cells: Nodes of each lane, shape (nb, 8, 16) int32.
+        cells: Nodes of each lane, shape (nb, 8, WIDTH) int32.
         filled: Number of elements of each block, shape (nb,) int32.
-        constants: The m entries of ``constants_of`` for each lane, lanes innermost, shape (nb, 16 m).
+        pattern: Pattern of each block, shape (nb,) int32; blocks of equal shapes share one.
+        constants: The m entries of ``constants_of`` for each lane of a pattern, lanes innermost, shape (np, WIDTH m).
         hourglass: Whether the energy of the higher modes counts as hourglass energy.
         numbers: Number of each element among all elements of the rank, shape (ne,).
         history: Empty, because the force follows from the displacement.
@@ -132,6 +134,7 @@ class TurningBlocks:
     points: NDArray[np.float64]
     cells: NDArray[np.int32]
     filled: NDArray[np.int32]
+    pattern: NDArray[np.int32]
     constants: NDArray[np.float64]
     hourglass: bool
     numbers: NDArray[np.int64]
@@ -154,12 +157,10 @@ class TurningBlocks:
     def build(cls, everything: Elements, chosen: NDArray[np.int64]) -> Self:
         """Return the elements numbered ``chosen (ne,)`` in blocks."""
         elements = cls.ordered(everything.subset(chosen))
-        element, filled = in_blocks(np.argsort(elements.cells.min(axis=1), kind="stable"))
-        first, shape = classes(replace(elements, density=np.zeros(len(elements.cells))))
-        cells = np.ascontiguousarray(elements.cells[element].transpose(0, 2, 1), dtype=np.int32)
-        constants = cls.constants_of(elements.subset(first))[shape[element]].transpose(0, 2, 1)
-        by_block = np.ascontiguousarray(constants).reshape(len(element), -1)
-        return cls(elements.points, cells, filled, by_block, elements.kind.hourglass, chosen)
+        lanes = arrange(elements, np.zeros(len(chosen), np.int32), WIDTH)
+        constants = lanes.spread(cls.constants_of(elements.subset(lanes.shape))[:, None])[:, 0]
+        arrays = lanes.nodes(elements), lanes.filled, lanes.pattern, constants
+        return cls(elements.points, *arrays, elements.kind.hourglass, chosen)
 
     def add(self, displacement: NDArray[np.float64], force: NDArray[np.float64]) -> None:
         """Subtract the internal force at a displacement ``(n, 3)`` [m] from ``force (n, 3)`` [N].
@@ -167,14 +168,19 @@ class TurningBlocks:
         Raises:
             InvertedElementError: An element is turned inside out.
         """
-        block = self.forces(self.cells, self.filled, self.constants, displacement, force)
+        block = self.forces(self.blocks, displacement, force)
         if block != UPRIGHT:
             raise self.inverted(block, displacement)
 
     @property
+    def blocks(self) -> tuple[NDArray, ...]:
+        """First arguments of the kernels."""
+        return self.cells, self.filled, self.pattern, self.constants
+
+    @property
     def arrays(self) -> dict[str, tuple[NDArray, ...]]:
         """Entry of ``kernels.levels.ForceArrays`` by name."""
-        return {self.entry: (self.cells, self.filled, self.constants)}
+        return {self.entry: self.blocks}
 
     def inverted(self, block: int, displacement: NDArray[np.float64]) -> InvertedElementError:
         """Return the error of a block with an element that is turned inside out."""
@@ -182,7 +188,7 @@ class TurningBlocks:
 
     def energy(self, displacement: NDArray[np.float64]) -> Energy:
         """Return the strain energy."""
-        return _split_energies(self.energies(self.cells, self.filled, self.constants, displacement), self.hourglass)
+        return _split_energies(self.energies(self.blocks, displacement), self.hourglass)
 
 
 class CorotationalBlocks(TurningBlocks):

@@ -21,9 +21,8 @@ from reflowshock.fem.elements.hexahedron import HEXAHEDRON
 from reflowshock.fem.elements.stress import symmetric, von_mises
 from reflowshock.fem.errors import InvertedElementError
 from reflowshock.fem.forces.energy import Energy
+from reflowshock.fem.forces.lanes import Lanes, arrange
 from reflowshock.fem.forces.nonlinear_blocks import (
-    Lanes,
-    arrange,
     gauss_volumes,
     gradient_blocks,
     hexahedron_blocks,
@@ -35,6 +34,7 @@ from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.nonlinear_gradient import FINE, Blocks, add_gradient_force
 from reflowshock.fem.kernels.nonlinear_hexahedron import HexahedronBlocks, add_hexahedron_force
 from reflowshock.fem.kernels.nonlinear_one_point import OnePointBlocks, add_one_point_force
+from reflowshock.fem.kernels.vectors.vector import WIDTH
 from reflowshock.fem.parallel.checkpoint_state import Rows
 from reflowshock.materials.plasticity import NEVER_YIELDS
 
@@ -88,7 +88,8 @@ class NonlinearElements:
         """
         elements = everything.subset(chosen)
         same, laws = merge_equal_materials(elements, plastic)
-        lanes, finite = arrange(same, same.material), path.finite
+        width = WIDTH if elements.kind.hourglass else LANES
+        lanes, finite = arrange(same, same.material, width), path.finite
         blocks: AnyBlocks
         kernel: Callable[[NDArray[np.float64], NDArray[np.float64]], int]
         if elements.kind.name == HEXAHEDRON.name:
@@ -138,7 +139,7 @@ class NonlinearElements:
         """Return the history by element for a checkpoint; ``cells`` are the global numbers of this rank's elements."""
         block, lane = np.nonzero(self.lanes.valid)
         numbers = cells[self.numbers[self.lanes.element[block, lane]]]
-        return {name: Rows(numbers, view_by_lane(values)[block, lane]) for name, values in self.history.items()}
+        return {name: Rows(numbers, self.lanes.view(values)[block, lane]) for name, values in self.history.items()}
 
     def restore(self, state: Mapping[str, NDArray[np.float64]]) -> None:
         """Set the history from the values that ``state`` returned, also in lanes that repeat an element."""
@@ -146,7 +147,7 @@ class NonlinearElements:
         row = np.empty(len(self.numbers), np.int64)
         row[self.lanes.element[block, lane]] = np.arange(len(block))
         for name, values in self.history.items():
-            view_by_lane(values)[...] = state[name][row[self.lanes.element]]
+            self.lanes.view(values)[...] = state[name][row[self.lanes.element]]
 
     def located(self, indices: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Return block and lane, each of shape (k,), of elements with ``indices (k,)`` into ``elements``."""
@@ -158,9 +159,8 @@ class NonlinearElements:
     def points(self, block: NDArray[np.int64], lane: NDArray[np.int64]) -> "PointValues":
         """Return the values at the integration points of elements, with block and lane from ``located``."""
         blocks = self.blocks
-        points = blocks.state.shape[1]
-        state = blocks.state.reshape(len(blocks.state), points, -1, LANES)[block, :, :, lane]
-        weight = blocks.weight[blocks.pattern[block]].reshape(-1, points, LANES)[np.arange(len(block)), :, lane]
+        state = self.lanes.view(blocks.state)[block, lane]
+        weight = self.lanes.view(blocks.weight)[blocks.pattern[block], lane, :, 0]
         work = blocks.plastic_work[block, lane] / weight.sum(axis=1)
         return PointValues(weight, state[..., :6], state[..., 6], work, self.ratios(block, lane))
 
@@ -171,12 +171,12 @@ class NonlinearElements:
             return 1.0
         if isinstance(blocks, HexahedronBlocks):
             positions = (
-                view_by_lane(values)[row, lane]
+                self.lanes.view(values)[row, lane]
                 for values, row in ((blocks.place, block), (blocks.corners, blocks.pattern[block]))
             )
             now, rest = (gauss_volumes(position.reshape(-1, 7, 3)) for position in positions)
             return now / rest
-        stretch = view_by_lane(blocks.state)[block, lane][..., 7:13]
+        stretch = self.lanes.view(blocks.state)[block, lane][..., 7:13]
         return np.linalg.det(symmetric(stretch.reshape(-1, 6))).reshape(stretch.shape[:-1])
 
     def means(self, indices: NDArray[np.integer]) -> "Means":
@@ -201,7 +201,7 @@ class NonlinearElements:
         """Copy the history of elements of another term; block and lane from its ``located``, in this term's order."""
         order = self.lanes.element
         for name, values in self.history.items():
-            view_by_lane(values)[...] = view_by_lane(other.history[name])[block[order], lane[order]]
+            self.lanes.view(values)[...] = other.lanes.view(other.history[name])[block[order], lane[order]]
 
     def inverted(self, block: int, displacement: NDArray[np.float64]) -> InvertedElementError:
         """Return the error that names the worst element of a block."""
@@ -256,29 +256,16 @@ class Means:
     plastic_work: NDArray[np.float64]
 
 
-def view_by_lane(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a view of block values with the sixteen lanes (elements of a block) as second axis.
-
-    Args:
-        values: Values of blocks, element innermost, shape (nb, ..., 16 k).
-
-    Returns:
-        View, shape (nb, 16, ..., k).
-    """
-    split = values.reshape(*values.shape[:-1], -1, LANES)
-    return np.moveaxis(split, -1, 1)
-
-
 def elastic_energy(blocks: AnyBlocks, elasticity: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the elastic energy s : C^-1 : s / 2 of each element of each block, shape (nb, 16) [J].
+    """Return the elastic energy s : C^-1 : s / 2 of each element of each block, shape (nb, width) [J].
 
     Args:
-        blocks: Elements in blocks of sixteen, with stresses and volumes; elements after the last one repeat it, and so
+        blocks: Elements in blocks, with stresses and volumes; elements after the last one repeat it, and so
             does their energy.
         elasticity: Elasticity of each material, shape (nm, 6, 6) [Pa].
     """
-    points = blocks.state.shape[1]
-    stress = blocks.state.reshape(len(blocks.state), points, -1, LANES)[:, :, :6]
+    points, width = blocks.state.shape[1], blocks.cells.shape[2]
+    stress = blocks.state.reshape(len(blocks.state), points, -1, width)[:, :, :6]
     strain = np.einsum("bij,bmjl->bmil", np.linalg.inv(elasticity)[blocks.material], stress, optimize=True)
-    weight = blocks.weight[blocks.pattern].reshape(-1, points, LANES)
+    weight = blocks.weight[blocks.pattern].reshape(-1, points, width)
     return np.asarray(0.5 * np.einsum("bmil,bmil,bml->bl", stress, strain, weight, optimize=True))

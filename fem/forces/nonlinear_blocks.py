@@ -1,20 +1,20 @@
 """Elements in blocks of sixteen lanes for the nonlinear kernels: order, constants of shapes, initial state."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reflowshock.fem.elements.element import Elements, classes, element_geometry
+from reflowshock.fem.elements.element import Elements, element_geometry
 from reflowshock.fem.elements.one_point import hourglass_control
 from reflowshock.fem.elements.tetrahedron import QUADRATIC_SHARE, TETRAHEDRON, Tetrahedron, quadratic_derivatives
 from reflowshock.fem.forces.force_congruent import SIGNS
+from reflowshock.fem.forces.lanes import Lanes
 from reflowshock.fem.kernels.hexahedron import GAUSS, GAUSS_DERIVATIVES
-from reflowshock.fem.kernels.lanes import LANES
-from reflowshock.fem.kernels.nonlinear import STATE_SLOTS, STRETCH
 from reflowshock.fem.kernels.nonlinear_gradient import Blocks
 from reflowshock.fem.kernels.nonlinear_hexahedron import POINT, HexahedronBlocks
 from reflowshock.fem.kernels.nonlinear_one_point import OnePointBlocks
+from reflowshock.fem.kernels.vectors.vector import WIDTH
 
 # Degree 2 (Hammer, Marlowe & Stroud 1956): exact for the stiffness of straight-edged 10-node tetrahedra.
 FOUR_POINTS = np.full((4, 4), (5.0 - np.sqrt(5.0)) / 20.0) + np.eye(4) / np.sqrt(5.0)
@@ -27,68 +27,6 @@ ORTHOTROPIC = (np.append(SYMMETRIC[0], [3, 4, 5]), np.append(SYMMETRIC[1], [3, 4
 HOURGLASS_PARITY, AMPLITUDES, HANDEDNESS = [3, 5, 6, 7], [2, 1, 0, 3], np.array([1.0, 1.0, 1.0, -1.0])
 LINEAR = [0, 1, 3]  # indices of the modes x, y, z among the parities from 1 on
 MODES, PAIRS = np.arange(4), np.triu_indices(4, 1)
-
-
-@dataclass(frozen=True, slots=True)
-class Lanes:
-    """Order of elements in blocks of sixteen lanes.
-
-    Attributes:
-        element: Element of each lane, shape (nb, 16); lanes after the last element of a group repeat it.
-        filled: Number of elements of each block, shape (nb,) int32.
-        pattern: Pattern of each block, shape (nb,) int32; blocks of equal shapes share one.
-        shape: One element of each distinct shape, shape (ns,).
-        pattern_shapes: Index into ``shape`` of each lane of a pattern, shape (np, 16).
-    """
-
-    element: NDArray[np.int64]
-    filled: NDArray[np.int32]
-    pattern: NDArray[np.int32]
-    shape: NDArray[np.int64]
-    pattern_shapes: NDArray[np.int64]
-
-    @property
-    def valid(self) -> NDArray[np.bool_]:
-        """Whether each lane holds an element of its own instead of a repeated one, shape (nb, 16)."""
-        return np.arange(LANES) < self.filled[:, None]
-
-    def spread(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return values of patterns ``(np, m, 16 k)``, lanes innermost, from values of shapes ``(ns, m, k)``."""
-        moved = values[self.pattern_shapes].transpose(0, 2, 3, 1)
-        return np.ascontiguousarray(moved).reshape(*moved.shape[:2], -1)
-
-
-def arrange(elements: Elements, group: NDArray[np.integer]) -> Lanes:
-    """Sort elements into blocks of sixteen, each within one group, with equal shapes together.
-
-    Args:
-        elements: Elements of one kind.
-        group: Group of each element, such as its material, shape (ne,), not negative.
-
-    Returns:
-        Order of the elements: element of each lane (nb, 16), elements per block, and the shapes that blocks share.
-    """
-    first, shape = classes(replace(elements, density=np.zeros(len(elements.cells))))
-    order = np.lexsort((elements.cells.min(axis=1), shape, group))
-    ends = np.flatnonzero(np.diff(group[order], append=-1)) + 1
-    parts = [in_blocks(order[start:end]) for start, end in zip([0, *ends[:-1]], ends, strict=True)]
-    element, filled = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    pattern_shapes, pattern = np.unique(shape[element], axis=0, return_inverse=True)
-    return Lanes(element, filled, pattern.reshape(-1).astype(np.int32), first, pattern_shapes)
-
-
-def in_blocks(order: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
-    """Split elements into blocks of sixteen.
-
-    Args:
-        order: Numbers of the elements, at least one, shape (k,).
-
-    Returns:
-        Elements of each block, the last one repeated, shape (nb, 16), and number of elements per block, shape (nb,).
-    """
-    padded = np.arange(-(-len(order) // LANES) * LANES)
-    filled = np.minimum(len(order) - padded[::LANES], LANES)
-    return order[np.minimum(padded, len(order) - 1)].reshape(-1, LANES), filled.astype(np.int32)
 
 
 def merge_equal_materials(elements: Elements, plastic: NDArray[np.float64]) -> tuple[Elements, NDArray[np.float64]]:
@@ -124,13 +62,13 @@ def gradient_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float6
         **_common_arrays(elements, lanes, plastic),
         gradient=lanes.spread(gradient.reshape(len(corners), points, -1)),
         weight=lanes.spread(weight[:, :, None]),
-        state=initial_state(len(lanes.filled), points, finite),
+        state=initial_state(lanes, points, finite),
         plastic_work=np.zeros(lanes.element.shape),
     )
 
 
 def one_point_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64], finite: bool) -> OnePointBlocks:
-    """Return stress-free one-point hexahedra in blocks of sixteen, the arguments of the nonlinear kernels.
+    """Return stress-free one-point hexahedra in blocks of ``WIDTH``, the arguments of the nonlinear kernels.
 
     Args:
         elements: Hexahedra of the one-point formulation.
@@ -144,10 +82,10 @@ def one_point_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float
         **_common_arrays(elements, lanes, plastic),
         constants=lanes.spread(hexahedron_constants(shapes)[:, None])[:, 0],
         weight=lanes.spread(volume[:, None, None]),
-        state=initial_state(len(lanes.filled), 1, finite),
+        state=initial_state(lanes, 1, finite),
         plastic_work=np.zeros(lanes.element.shape),
         hourglass_energy=np.zeros(lanes.element.shape),
-        slip=_written_zeros(len(lanes.filled), 12 * LANES),
+        slip=_written_zeros(len(lanes.filled), 12 * WIDTH),
         modulus=1.0 / np.linalg.inv(elements.elasticity)[:, 0, 0],
     )
 
@@ -234,7 +172,7 @@ def gauss_volumes(position: NDArray[np.float64]) -> NDArray[np.float64]:
 def _common_arrays(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64]) -> dict[str, NDArray]:
     """Return the arrays common to blocks of all kinds by name; ``plastic (nm, 6)`` as in ``materials.plasticity``."""
     return {
-        "cells": np.ascontiguousarray(elements.cells[lanes.element].transpose(0, 2, 1)),
+        "cells": lanes.nodes(elements),
         "filled": lanes.filled,
         "pattern": lanes.pattern,
         "material": np.ascontiguousarray(elements.material[lanes.element[:, 0]]),
@@ -274,18 +212,18 @@ def elastic_constants(elasticity: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.ascontiguousarray(elasticity[:, ORTHOTROPIC[0], ORTHOTROPIC[1]])
 
 
-def initial_state(blocks: int, points: int, finite: bool) -> NDArray[np.float64]:
-    """Return the stress-free state of elements in blocks of sixteen.
+def initial_state(lanes: Lanes, points: int, finite: bool) -> NDArray[np.float64]:
+    """Return the stress-free state of elements in blocks.
 
     Args:
-        blocks: Number of blocks nb.
+        lanes: Order of the elements.
         points: Number of integration points m of an element.
         finite: Whether strains are finite; the stretches of the state are then the identity, otherwise 0 and not used.
 
     Returns:
-        State, shape (nb, m, 208), entry k of element e at ``16 * k + e``: stress xx, yy, zz, xy, yz, xz [Pa],
+        State, shape (nb, m, 13 width), entry k of element e at ``width * k + e``: stress xx, yy, zz, xy, yz, xz [Pa],
         equivalent plastic strain, stretch in the order of the stress.
     """
-    state = _written_zeros(blocks, points, STATE_SLOTS)
-    state[:, :, STRETCH : STRETCH + 3 * LANES] = float(finite)
+    state = _written_zeros(len(lanes.filled), points, 13 * lanes.width)
+    state[:, :, 7 * lanes.width : 10 * lanes.width] = float(finite)
     return state

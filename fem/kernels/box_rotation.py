@@ -24,11 +24,9 @@ from reflowshock.fem.kernels.lanes import (
     applied,
     cofactor_symmetric,
     full,
-    gather_lanes,
     nine,
     put_nine,
     put_three,
-    scatter_lanes,
     three,
     times,
     transposed,
@@ -349,52 +347,4 @@ def row_energies(rows, scales, constants, displacement):
                 energies = box_energies(w, lane, own_constants(k, lane))
                 mean += energies[0]
                 higher += energies[1]
-    return mean, higher
-
-
-@njit(cache=True)
-def add_turned_block_forces(cells, filled, constants, displacement, force):
-    """Subtract the internal force of corotational boxes of any shapes.
-
-    Args:
-        cells: Nodes of blocks of 16 boxes in tensor order, boxes after the last one repeat it, shape (nb, 8, 16) int32.
-        filled: Number of boxes of each block, shape (nb,) int32.
-        constants: 27 box constants and three scales, entry i of box e at ``16 i + e``, shape (nb, 480) [J, N/m, 1/m].
-        displacement: Nodal displacement, shape (n, 3) [m].
-        force: Nodal force, shape (n, 3) [N], subtracted from.
-
-    Returns:
-        ``UPRIGHT`` (-1), or the first block with a box that is turned inside out; then the force is not complete.
-    """
-    w = np.empty(TURNED_SLOTS)
-    for b in range(len(cells)):
-        gather_lanes(cells[b], displacement, w)
-        transform_corners(w)
-        write_deformation(constants[b], w)
-        if not rotate(w[DEFORMATION:]):
-            return b
-        replace_by_forces(constants[b], w)
-        transform_corners(w)
-        scatter_lanes(cells[b], filled[b], w, force)
-    return UPRIGHT
-
-
-@njit(cache=True)
-def block_energies(cells, filled, constants, displacement):
-    """Return the total energies of mean strains and of higher modes of boxes in blocks, two scalars [J].
-
-    ``cells (nb, 8, 16)``: nodes; ``filled (nb,)``: boxes of each block; ``constants (nb, 480)``: 27 + 3 scales,
-    entry i of box e at ``16 i + e``; ``displacement (n, 3)``: nodal [m].
-    """
-    w = np.zeros(TURNED_SLOTS)
-    mean = higher = 0.0
-    for b in range(len(cells)):
-        gather_lanes(cells[b], displacement, w)
-        transform_corners(w)
-        write_deformation(constants[b], w)
-        rotate(w[DEFORMATION:])
-        for lane in range(np.int64(filled[b])):
-            energies = box_energies(w, lane, own_constants(constants[b], lane))
-            mean += energies[0]
-            higher += energies[1]
     return mean, higher

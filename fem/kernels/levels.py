@@ -10,7 +10,7 @@ from numba import njit, types
 from numba.experimental import structref
 from numpy.typing import NDArray
 
-from reflowshock.fem.kernels.box_rotation import add_turned_block_forces, add_turned_row_forces
+from reflowshock.fem.kernels.box_rotation import add_turned_row_forces
 from reflowshock.fem.kernels.box_rows import add_row_forces, read_lines, subtract_lines
 from reflowshock.fem.kernels.force import add_block_force
 from reflowshock.fem.kernels.motion import (
@@ -28,6 +28,7 @@ from reflowshock.fem.kernels.nonlinear import Path
 from reflowshock.fem.kernels.nonlinear_hexahedron import HexahedronBlocks, add_hexahedron_force
 from reflowshock.fem.kernels.nonlinear_one_point import OnePointBlocks, add_one_point_force
 from reflowshock.fem.kernels.turned_hexahedron import add_turned_forces
+from reflowshock.fem.kernels.vectors.box import add_turned_block_forces
 
 ALL_FINE = -1  # no element is turned inside out
 PACES = 3  # number of different intervals, in steps, at which force terms may act
@@ -41,8 +42,8 @@ class ForceArrays(NamedTuple):
         congruent: Nodes, axes, rows, blocks and lines of ``kernels.box_rows``.
         assembled: Pointer, columns and blocks of ``kernels.force.add_block_force``.
         turning_rows: Nodes, axes, rows, scales, constants and lines of ``box_rotation.add_turned_row_forces``.
-        turning_boxes: Cells, filled and constants of ``box_rotation.add_turned_block_forces``.
-        turning: Cells, filled and constants of ``turned_hexahedron.add_turned_forces``.
+        turning_boxes: Cells, filled, pattern and constants of ``vectors.box.add_turned_block_forces``.
+        turning: Cells, filled, pattern and constants of ``turned_hexahedron.add_turned_forces``.
         one_point, hexahedron, path: Blocks of ``nonlinear_one_point`` and ``nonlinear_hexahedron``, and their ``Path``.
     """
 
@@ -164,12 +165,10 @@ def add_forces(arrays, displacement, force):
         if block >= 0:
             return 2, block
         subtract_lines(nodes, axes, lines[1], force)
-    cells, filled, constants = arrays.turning_boxes
-    block = add_turned_block_forces(cells, filled, constants, displacement, force)
+    block = add_turned_block_forces(arrays.turning_boxes, displacement, force)
     if block >= 0:
         return 3, block
-    cells, filled, constants = arrays.turning
-    block = add_turned_forces(cells, filled, constants, displacement, force)
+    block = add_turned_forces(arrays.turning, displacement, force)
     if block >= 0:
         return 4, block
     block = add_one_point_force(arrays.one_point, arrays.path, displacement, force)

@@ -1,4 +1,4 @@
-"""Numba kernels of one-point hexahedra that yield: sixteen side by side, a path at the centre and of hourglass slip.
+"""Numba kernels of one-point hexahedra that yield: side by side in vectors, a path at the centre and of hourglass slip.
 
 Modes, mean deformation F = R U and hourglass amplitudes g^ = R^T g are those of ``kernels.turned_hexahedron``, the
 stress s at the centre that of ``kernels.nonlinear``. Hourglass forces are H (g^ - slip), H the stiffness that the
@@ -18,64 +18,52 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from reflowshock.fem.kernels.box_rotation import DEFORMATION, ROTATION, add_cross, spin, transform_corners
-from reflowshock.fem.kernels.lanes import (
-    LANE_OPTIONS,
-    LANES,
-    cofactor_symmetric,
-    full,
-    gather_lanes,
-    nine,
-    put_nine,
-    scatter_lanes,
-    six,
-    three,
-    times,
-)
-from reflowshock.fem.kernels.nonlinear import (
-    MISES,
-    PLASTIC,
-    STRESS,
-    STRETCH,
-    elastic_stress,
-    rotate,
-    small_increment,
-    stretch_increment,
-)
+from reflowshock.fem.kernels.box_rotation import spin
+from reflowshock.fem.kernels.lanes import LANE_OPTIONS, add_elastic, cofactor_symmetric, full, times
 from reflowshock.fem.kernels.nonlinear_gradient import FINE
-from reflowshock.fem.kernels.plastic_lanes import add_work, law_of, plastic_flow
-from reflowshock.fem.kernels.plasticity import yield_stress
 from reflowshock.fem.kernels.turned_hexahedron import (
-    SHIFT,
-    SLOTS,
-    A,
-    B,
-    C,
-    D,
-    replace_by_turned_forces,
-    write_amplitudes,
-    write_mean_deformation,
-    write_resistance,
+    ENTRIES,
+    amplitudes,
+    deformation_gradient,
+    displacement_gradient,
+    forces_on_modes,
+    moment_of,
+    resistance,
 )
-from reflowshock.materials.plasticity import FIRST_YIELD
+from reflowshock.fem.kernels.vectors.functions import choose, larger, root, smaller
+from reflowshock.fem.kernels.vectors.memory import (
+    all_below,
+    broadcast,
+    load,
+    place,
+    prefetch_range,
+    put_six,
+    put_three,
+    six,
+    store,
+    three,
+)
+from reflowshock.fem.kernels.vectors.modes import dot, minus, plus, read_modes, scaled, subtract_modes
+from reflowshock.fem.kernels.vectors.plastic import hardened_by, law_at, plastic_strains, returned
+from reflowshock.fem.kernels.vectors.polar import polar
+from reflowshock.fem.kernels.vectors.vector import VECTOR_OPTIONS, WIDTH
 
-AMPLITUDES = 12 * LANES
 BENDING_STRENGTH = np.sqrt(0.75)  # 3/2 of the yield stress at the faces of a section, as a root mean square
 LEAST_STRENGTH = 0.05  # share of the bending strength that remains where the centre yields
-IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+PLASTIC, STRETCH, STATE_SLOTS = 6 * WIDTH, 7 * WIDTH, 13 * WIDTH  # of the state, after the stress
 
 
 class OnePointBlocks(NamedTuple):
-    """One-point hexahedra in blocks of sixteen lanes; blocks of equal shapes share a pattern.
+    """One-point hexahedra in blocks of ``WIDTH`` lanes; blocks of equal shapes share a pattern.
 
     Attributes:
         cells, filled, pattern, material, elastic, plastic: As in ``kernels.nonlinear_gradient.Blocks``.
-        constants: ``(np, 16 * 120)``, of each lane those of ``kernels.turned_hexahedron``.
-        weight: ``(np, 1, 16)`` [m^3] volume.
-        state: ``(nb, 1, 16 * 13)``, see ``kernels.nonlinear``.
-        plastic_work: ``(nb, 16)`` [J].
-        hourglass_energy: ``(nb, 16)`` [J].
-        slip: ``(nb, 16 * 12)`` [m] plastic part of the amplitudes.
+        constants: ``(np, WIDTH * 120)``, of each lane those of ``kernels.turned_hexahedron``.
+        weight: ``(np, 1, WIDTH)`` [m^3] volume.
+        state: ``(nb, 1, WIDTH * 13)``, see ``kernels.nonlinear``.
+        plastic_work: ``(nb, WIDTH)`` [J].
+        hourglass_energy: ``(nb, WIDTH)`` [J].
+        slip: ``(nb, WIDTH * 12)`` [m] plastic part of the amplitudes.
         modulus: ``(nm,)`` [Pa] Young's modulus.
     """
 
@@ -94,50 +82,6 @@ class OnePointBlocks(NamedTuple):
     modulus: NDArray[np.float64]
 
 
-@njit(**LANE_OPTIONS)
-def do_not_turn(w):
-    """Write the identity as rotation R of sixteen elements.
-
-    Args:
-        w: Flat workspace, shape (1312,); 144 entries are written at ``ROTATION``, entry k of element e at
-            ``16 * k + e``.
-    """
-    for lane in range(LANES):
-        put_nine(w, ROTATION + lane, IDENTITY)
-
-
-@njit(**LANE_OPTIONS)
-def subtract_slip(w, slip):
-    """Subtract the plastic slip from the hourglass amplitudes of sixteen elements.
-
-    Args:
-        w: Flat workspace; the twelve amplitudes g^ [m] at ``A`` (three components of the modes xy, xz, yz, xyz) become
-            their elastic part g^ - slip.
-        slip: Slip in the same order, entry k of element e at ``16 * k + e``, shape (192,) [m].
-    """
-    for k in range(AMPLITUDES):
-        w[A + k] -= slip[k]
-
-
-@njit(**LANE_OPTIONS)
-def write_hourglass_energy(w, slip, energy):
-    """Compute the hourglass energy (g^ - slip) . H (g^ - slip) / 2 of sixteen elements, and restore g^.
-
-    Args:
-        w: Flat workspace with the twelve elastic amplitudes [m] at ``A``, to which the slip is added back, and the
-            twelve hourglass forces [N] at ``A + SHIFT``, entry k of element e at ``16 * k + e``.
-        slip: Plastic slip of the amplitudes in the same order, shape (192,) [m].
-        energy: Written, shape (16,) [J].
-    """
-    for lane in range(LANES):
-        total = 0.0
-        for k in range(0, AMPLITUDES, LANES):
-            elastic = w[A + k + lane]
-            total += elastic * w[A + SHIFT + k + lane]
-            w[A + k + lane] = elastic + slip[k + lane]
-        energy[lane] = 0.5 * total
-
-
 @njit(cache=True, error_model="numpy")
 def carried(strength, mises):
     """Return the largest hourglass stress that a section carries next to its axial stress, a scalar [Pa].
@@ -149,153 +93,211 @@ def carried(strength, mises):
     return BENDING_STRENGTH * strength * max(LEAST_STRENGTH, 1.0 - (mises / strength) ** 2)
 
 
-@njit(**LANE_OPTIONS)
-def may_slip(w, energy, weight, first, young):
-    """Return how many of sixteen elements exceed the hourglass limit at the first yield stress, as a float.
+@njit(**VECTOR_OPTIONS)
+def section_limit(strength, mises):
+    """Return the largest hourglass stress next to an axial stress, as ``carried``; all are vectors [Pa]."""
+    ratio = mises / strength
+    return BENDING_STRENGTH * strength * larger(1.0 - ratio * ratio, broadcast(LEAST_STRENGTH))
+
+
+@njit(**VECTOR_OPTIONS)
+def small_strain(h):
+    """Return the strain xx, yy, zz, xy, yz, xz (engineering shear) of a displacement gradient, nine vectors."""
+    return h[0], h[4], h[8], h[1] + h[3], h[5] + h[7], h[2] + h[6]
+
+
+@njit(**VECTOR_OPTIONS)
+def change_of(new, old):
+    """Return the difference of six vectors."""
+    return new[0] - old[0], new[1] - old[1], new[2] - old[2], new[3] - old[3], new[4] - old[4], new[5] - old[5]
+
+
+@njit(**VECTOR_OPTIONS)
+def stretch_increment(new, old):
+    """Return the strain increment sym((U_1 - U_0) ((U_0 + U_1) / 2)^-1), six vectors with engineering shear.
 
     Args:
-        w: Flat workspace; reads the von Mises stresses [Pa] of the sixteen centres at ``DEFORMATION + MISES``.
-        energy: Hourglass energy, shape (16,) [J].
-        weight: Volume, shape (16,) [m^3].
-        first: First yield stress, scalar [Pa].
-        young: Young's modulus, scalar [Pa].
+        new: Stretch U_1 after the step, six vectors xx, yy, zz, xy, yz, xz.
+        old: Stretch U_0 before it, six vectors.
     """
-    count = 0.0
-    for lane in range(LANES):
-        ratio = w[DEFORMATION + MISES + lane] / first
-        left = 1.0 - ratio * ratio
-        limit = BENDING_STRENGTH * first * (left if left > LEAST_STRENGTH else LEAST_STRENGTH)
-        count += 1.0 if 2.0 * young * energy[lane] > limit * limit * weight[lane] else 0.0
-    return count
+    d = change_of(new, old)
+    m = (
+        0.5 * (new[0] + old[0]), 0.5 * (new[1] + old[1]), 0.5 * (new[2] + old[2]),
+        0.5 * (new[3] + old[3]), 0.5 * (new[4] + old[4]), 0.5 * (new[5] + old[5]),
+    )  # fmt: skip
+    c = cofactor_symmetric(m)
+    s, a = 1.0 / (m[0] * c[0] + m[3] * c[3] + m[5] * c[5]), times(full(d), full(c))
+    return s * a[0], s * a[4], s * a[8], s * (a[1] + a[3]), s * (a[5] + a[7]), s * (a[2] + a[6])
 
 
-@njit(cache=True, error_model="numpy")
-def hourglass_flow(blocks, b, before, w):
-    """Reduce the hourglass forces of a block of sixteen elements to the limit of a section; the excess becomes slip.
+@njit(**VECTOR_OPTIONS)
+def elasticity_at(elastic, material):
+    """Return the nine constants [Pa] of a material; ``elastic`` is a pointer to those of all materials."""
+    k = 9 * material
+    return (
+        elastic[k], elastic[k + 1], elastic[k + 2], elastic[k + 3], elastic[k + 4],
+        elastic[k + 5], elastic[k + 6], elastic[k + 7], elastic[k + 8],
+    )  # fmt: skip
+
+
+@njit(**VECTOR_OPTIONS)
+def mises_of(s):
+    """Return the von Mises stress of a stress of six vectors, a vector [Pa]."""
+    x, y, z = s[0] - s[1], s[1] - s[2], s[2] - s[0]
+    return root(0.5 * (x * x + y * y + z * z) + 3.0 * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]))
+
+
+@njit(**VECTOR_OPTIONS)
+def move_centre(state, d, elastic, law):
+    """Advance the stress at the centres by a step, and store it.
+
+    Args:
+        state: Pointer to the state, and position of the block in it.
+        d: Strain increment, six vectors with engineering shear.
+        elastic: Orthotropic elasticity, nine scalars [Pa].
+        law: Constants of ``vectors.plastic.law_at``.
+
+    Returns:
+        Stress, six vectors [Pa], its von Mises stress [Pa], plastic strain and plastic work density [J/m^3].
+    """
+    values, at = state
+    s, strain, density = add_elastic(six(values, at), d, elastic), load(values, at + PLASTIC), broadcast(0.0)
+    mises = mises_of(s)
+    if not all_below(mises, law[1]):
+        flow = plastic_strains(mises, strain, law)
+        s, density = returned(s, d, mises, flow, law[0])
+        strain = strain + flow
+        mises = mises - law[0] * flow
+        store(values, at + PLASTIC, strain)
+    put_six(values, at, s)
+    return s, mises, strain, density
+
+
+@njit(**VECTOR_OPTIONS)
+def slip_factor(trial, centre, law):
+    """Return the factor that reduces hourglass forces to the limit of a section, a vector, 1 below the limit.
+
+    Args:
+        trial: Hourglass stress before the reduction, a vector [Pa].
+        centre: Von Mises stress [Pa] and plastic strain of the centre, two vectors.
+        law: Constants of ``vectors.plastic.law_at``.
+    """
+    mises, strain = centre
+    one, first = broadcast(1.0), section_limit(broadcast(law[1]), mises)  # the yield stress is at least the first one
+    limit = section_limit(larger(law[1] + hardened_by(strain, law), mises), mises)
+    return choose(first, trial, smaller(limit / larger(trial, first), one), one)
+
+
+@njit(**VECTOR_OPTIONS)
+def read_four(values, at):
+    """Return four tuples of three vectors; ``values`` is a pointer, ``at`` the first position."""
+    return (
+        three(values, at),
+        three(values, at + 3 * WIDTH),
+        three(values, at + 6 * WIDTH),
+        three(values, at + 9 * WIDTH),
+    )
+
+
+@njit(**VECTOR_OPTIONS)
+def four_minus(a, b):
+    """Return a - b; both are four tuples of three vectors."""
+    return minus(a[0], b[0]), minus(a[1], b[1]), minus(a[2], b[2]), minus(a[3], b[3])
+
+
+@njit(**VECTOR_OPTIONS)
+def four_scaled(factor, a):
+    """Return a vector times four tuples of three vectors."""
+    return scaled(factor, a[0]), scaled(factor, a[1]), scaled(factor, a[2]), scaled(factor, a[3])
+
+
+@njit(**VECTOR_OPTIONS)
+def half_product(a, f):
+    """Return a . f / 2, a vector; both are four tuples of three vectors."""
+    return 0.5 * (dot(a[0], f[0]) + dot(a[1], f[1]) + dot(a[2], f[2]) + dot(a[3], f[3]))
+
+
+@njit(**VECTOR_OPTIONS)
+def move_hourglass(parts, b, elastic, f, trial):
+    """Return hourglass forces within the limit of a section, four tuples [N]; the excess becomes slip.
 
     Plastic work is the slip times the mean force of the step, without the rotation of the force within it.
 
     Args:
-        blocks: ``OnePointBlocks``; hourglass energy, slip and plastic work of the block are updated.
-        b: Number of the block, integer.
-        before: Hourglass energy before the step, shape (16,) [J].
-        w: Flat workspace with twelve amplitudes at ``A`` [m], the von Mises stress of the centre at ``DEFORMATION +
-            MISES`` [Pa], and twelve hourglass forces at ``A + SHIFT`` [N], which are reduced.
+        parts: Pointers to slip [m], hourglass energy [J] and plastic work [J], which are updated.
+        b: Number of the block.
+        elastic: Elastic amplitudes g^ - slip, four tuples [m].
+        f: Hourglass forces H (g^ - slip), four tuples [N].
+        trial: Factor of ``slip_factor`` and hourglass energy before the reduction [J], two vectors.
     """
-    law, young = blocks.plastic[blocks.material[b]], blocks.modulus[blocks.material[b]]
-    state, weight, slip = blocks.state[b, 0], blocks.weight[blocks.pattern[b], 0], blocks.slip[b]
-    energy = blocks.hourglass_energy[b]
-    for lane in range(LANES):
-        trial = energy[lane]
-        stress, mises = np.sqrt(2.0 * young * max(trial, 0.0) / weight[lane]), w[DEFORMATION + MISES + lane]
-        if stress <= carried(law[FIRST_YIELD], mises):  # the yield stress is at least this
-            continue
-        factor = carried(max(yield_stress(state[PLASTIC + lane], 0.0, law), mises), mises) / stress
-        if factor < 1.0:
-            energy[lane] = factor * factor * trial
-            blocks.plastic_work[b, lane] += (1.0 - factor) * (np.sqrt(before[lane] * trial) + factor * trial)
-            for k in range(0, AMPLITUDES, LANES):
-                slip[k + lane] += (1.0 - factor) * (w[A + k + lane] - slip[k + lane])
-                w[A + SHIFT + k + lane] *= factor
+    slips, energies, works = parts
+    factor, energy = trial
+    lost, at, here = 1.0 - factor, 12 * WIDTH * b, WIDTH * b
+    mean = root(larger(load(energies, here) * energy, broadcast(0.0))) + factor * energy
+    store(works, here, load(works, here) + lost * mean)
+    store(energies, here, factor * factor * energy)
+    slip = four_scaled(lost, elastic)
+    put_three(slips, at, plus(three(slips, at), slip[0]))
+    put_three(slips, at + 3 * WIDTH, plus(three(slips, at + 3 * WIDTH), slip[1]))
+    put_three(slips, at + 6 * WIDTH, plus(three(slips, at + 6 * WIDTH), slip[2]))
+    put_three(slips, at + 9 * WIDTH, plus(three(slips, at + 9 * WIDTH), slip[3]))
+    return four_scaled(factor, f)
+
+
+@njit(**VECTOR_OPTIONS)
+def nominal_stress(r, u, s, volume, moment):
+    """Return P, the nominal stress times volume (derivative of the energy by F), nine vectors row by row [J].
+
+    Args:
+        r: Rotation R, nine vectors row by row.
+        u: Stretch U, six vectors.
+        s: Stress, six vectors [Pa].
+        volume: Initial volume, a vector [m^3].
+        moment: Moment of the hourglass forces, three vectors [J].
+    """
+    c = cofactor_symmetric(u)
+    v = volume / (u[0] * c[0] + u[3] * c[3] + u[5] * c[5])
+    t = times(full((v * s[0], v * s[1], v * s[2], v * s[3], v * s[4], v * s[5])), full(c))
+    x, y, z = spin(u, moment)
+    return times(r, (t[0], t[1] + z, t[2] - y, t[3] - z, t[4], t[5] + x, t[6] + y, t[7] - x, t[8]))
+
+
+@njit(**VECTOR_OPTIONS)
+def small_nominal_stress(s, volume):
+    """Return the stress (six vectors [Pa]) times the volume (a vector [m^3]), nine vectors row by row [J]."""
+    return full((volume * s[0], volume * s[1], volume * s[2], volume * s[3], volume * s[4], volume * s[5]))
+
+
+@njit(**VECTOR_OPTIONS)
+def no_rotation():
+    """Return the identity, nine vectors row by row."""
+    one, none = broadcast(1.0), broadcast(0.0)
+    return one, none, none, none, one, none, none, none, one
+
+
+@njit(**VECTOR_OPTIONS)
+def deform(h, old, finite):
+    """Return rotation R (nine vectors), new stretch or small strain, strain increment (six each), and det F > 0.
+
+    Args:
+        h: Mean displacement gradient F - 1, nine vectors row by row.
+        old: Stretch or small strain before the step, six vectors.
+        finite: Whether rotations and strains are finite.
+    """
+    if finite:
+        r, e, upright = polar(deformation_gradient(h))
+        new = e[0] + 1.0, e[1] + 1.0, e[2] + 1.0, e[3], e[4], e[5]
+        return r, new, stretch_increment(new, old), upright
+    new = small_strain(h)
+    return no_rotation(), new, change_of(new, old), True
 
 
 @njit(**LANE_OPTIONS)
-def write_nominal_small(w, state, weight):
-    """Replace F of sixteen elements by the stress times the volume, for small kinematics.
-
-    Args:
-        w: Flat workspace, written at ``DEFORMATION`` [J], entry k (row by row) of element e at ``16 * k + e``.
-        state: Flat state of the centres in the same order, shape (208,); reads the six stresses [Pa] at ``STRESS``.
-        weight: Volume, shape (16,) [m^3].
-    """
-    for lane in range(LANES):
-        s, v = six(state, STRESS + lane), weight[lane]
-        put_nine(w, DEFORMATION + lane, full((v * s[0], v * s[1], v * s[2], v * s[3], v * s[4], v * s[5])))
-
-
-@njit(**LANE_OPTIONS)
-def write_nominal_finite(w, state, weight):
-    """Replace F of sixteen elements by P, the nominal stress times volume (derivative of the energy by F).
-
-    Args:
-        w: Flat workspace, entry k of element e at ``16 * k + e``; reads R at ``ROTATION``, twelve amplitudes g^ at
-            ``A`` [m] and hourglass forces at ``A + SHIFT`` [N]; P is written at ``DEFORMATION`` [J], row by row.
-        state: Flat state of the centres in the same order, shape (208,); reads six stresses [Pa] at ``STRESS`` and six
-            entries of the stretch U at ``STRETCH``.
-        weight: Initial volume, shape (16,) [m^3].
-    """
-    for lane in range(LANES):
-        s, u = six(state, STRESS + lane), six(state, STRETCH + lane)
-        c = cofactor_symmetric(u)
-        v = weight[lane] / (u[0] * c[0] + u[3] * c[3] + u[5] * c[5])
-        t = times(full((v * s[0], v * s[1], v * s[2], v * s[3], v * s[4], v * s[5])), full(c))
-        moment = add_cross((0.0, 0.0, 0.0), three(w, A + lane), three(w, A + SHIFT + lane))
-        moment = add_cross(moment, three(w, B + lane), three(w, B + SHIFT + lane))
-        moment = add_cross(moment, three(w, C + lane), three(w, C + SHIFT + lane))
-        x, y, z = spin(u, add_cross(moment, three(w, D + lane), three(w, D + SHIFT + lane)))
-        turned = (t[0], t[1] + z, t[2] - y, t[3] - z, t[4], t[5] + x, t[6] + y, t[7] - x, t[8])
-        put_nine(w, DEFORMATION + lane, times(nine(w, ROTATION + lane), turned))
-
-
-@njit(cache=True)
-def move_centre(blocks, b, path, w):
-    """Advance the stress at the centres of a block of sixteen elements by a step.
-
-    Args:
-        blocks: ``OnePointBlocks``; state and plastic work of the block are updated.
-        b: Number of the block, integer.
-        path: ``Path``: small or finite kinematics, and the time step of rate-dependent laws [s].
-        w: Flat workspace; reads F (finite) or the displacement gradient (small) at ``DEFORMATION``, nine entries;
-            writes R at ``ROTATION`` (finite) and the von Mises stress at ``DEFORMATION + MISES`` [Pa].
-
-    Returns:
-        Whether no element is turned inside out; otherwise the state is unchanged.
-    """
-    state, material, point = blocks.state[b, 0], blocks.material[b], w[DEFORMATION:]
-    if path.finite:
-        if not rotate(point):
-            return False
-        stretch_increment(point, state)
-    else:
-        small_increment(point, state)
-    elastic_stress(point, state, blocks.elastic[material])
-    weight, law = blocks.weight[blocks.pattern[b]], law_of(blocks.plastic, material, path.step)
-    g = np.int64(0)  # of this type: Numba would compile the return to the yield surface once more for a literal
-    if plastic_flow(point, blocks.state[b], g, law):
-        add_work(point, weight, g, blocks.plastic_work[b])
-    return True
-
-
-@njit(cache=True)
-def move_hourglass(blocks, b, unit, before, w):
-    """Write hourglass amplitudes and forces of a block of sixteen elements, and update energy and slip.
-
-    Args:
-        blocks: ``OnePointBlocks``; hourglass energy, slip and plastic work of the block are updated.
-        b: Number of the block, integer.
-        unit: 1.0 for finite kinematics (the workspace has F), 0.0 for small ones (it has F - 1), a scalar.
-        before: Workspace of shape (16,), overwritten by the hourglass energies before the step [J].
-        w: Flat workspace; reads transformed displacements [m], F or F - 1 at ``DEFORMATION`` and R at ``ROTATION``;
-            twelve amplitudes [m] are written at ``A``, twelve forces [N] at ``A + SHIFT``.
-    """
-    k, energy, slip = blocks.constants[blocks.pattern[b]], blocks.hourglass_energy[b], blocks.slip[b]
-    weight, material = blocks.weight[blocks.pattern[b], 0], blocks.material[b]
-    write_amplitudes(k, w, unit)
-    subtract_slip(w, slip)
-    write_resistance(k, w)
-    for lane in range(LANES):
-        before[lane] = energy[lane]
-    write_hourglass_energy(w, slip, energy)
-    if may_slip(w, energy, weight, blocks.plastic[material, FIRST_YIELD], blocks.modulus[material]) > 0.0:
-        hourglass_flow(blocks, b, before, w)
-
-
-@njit(cache=True)
 def add_one_point_force(blocks, path, displacement, force):
     """Subtract the internal force of one-point hexahedra, and advance their state by a step.
 
     Args:
-        blocks: ``OnePointBlocks``: the elements in blocks of sixteen; state, slip, energies and work are updated.
+        blocks: ``OnePointBlocks``; state, slip, energies and work are updated.
         path: ``Path``: small or finite kinematics, and the time step of rate-dependent laws [s].
         displacement: Nodal displacement after the step, shape (n, 3) [m].
         force: Nodal force, shape (n, 3) [N], subtracted from.
@@ -303,21 +305,33 @@ def add_one_point_force(blocks, path, displacement, force):
     Returns:
         ``FINE`` (-1), or the first block with an element that is turned inside out; then the force is not complete.
     """
-    w, before, unit = np.empty(SLOTS), np.empty(LANES), 1.0 if path.finite else 0.0
-    do_not_turn(w)
-    for b in range(len(blocks.cells)):
-        k, weight = blocks.constants[blocks.pattern[b]], blocks.weight[blocks.pattern[b], 0]
-        gather_lanes(blocks.cells[b], displacement, w)
-        transform_corners(w)
-        write_mean_deformation(k, w, unit)
-        if not move_centre(blocks, b, path, w):
+    nodes, k, u, f = place(blocks.cells), place(blocks.constants), place(displacement), place(force)
+    state, volumes, works = place(blocks.state), place(blocks.weight), place(blocks.plastic_work)
+    slips, energies = place(blocks.slip), place(blocks.hourglass_energy)
+    elastic, plastic, finite, count = place(blocks.elastic), place(blocks.plastic), path.finite, len(blocks.filled)
+    for b in range(count):
+        pattern, material = np.int64(blocks.pattern[b]), np.int64(blocks.material[b])
+        at, here = ENTRIES * pattern, STATE_SLOTS * b
+        if b + 1 < count:
+            prefetch_range(k, ENTRIES * np.int64(blocks.pattern[b + 1]), ENTRIES)
+        law, volume = law_at(plastic, material, path.step), load(volumes, WIDTH * pattern)
+        q = read_modes(u, nodes, b)
+        h = displacement_gradient(k, at, q)
+        r, new, d, upright = deform(h, six(state, here + STRETCH), finite)
+        if not upright:
             return b
-        move_hourglass(blocks, b, unit, before, w)
-        if path.finite:
-            write_nominal_finite(w, blocks.state[b, 0], weight)
-        else:
-            write_nominal_small(w, blocks.state[b, 0], weight)
-        replace_by_turned_forces(k, w)
-        transform_corners(w)
-        scatter_lanes(blocks.cells[b], blocks.filled[b], w, force)
+        put_six(state, here + STRETCH, new)
+        s, mises, strain, density = move_centre((state, here), d, elasticity_at(elastic, material), law)
+        store(works, WIDTH * b, load(works, WIDTH * b) + volume * density)
+        g = amplitudes(k, at, q, h, r)
+        free = four_minus(g, read_four(slips, 12 * WIDTH * b))
+        resisting = resistance(k, at, free)
+        energy = half_product(free, resisting)
+        trial = root(2.0 * blocks.modulus[material] * larger(energy, broadcast(0.0)) / volume)
+        factor = broadcast(1.0)
+        if not all_below(trial - section_limit(broadcast(law[1]), mises), 0.0):
+            factor = slip_factor(trial, (mises, strain), law)
+        resisting = move_hourglass((slips, energies, works), b, free, resisting, (factor, energy))
+        p = nominal_stress(r, new, s, volume, moment_of(g, resisting)) if finite else small_nominal_stress(s, volume)
+        subtract_modes(f, nodes, b, np.int64(blocks.filled[b]), forces_on_modes(k, at, r, p, resisting))
     return FINE

@@ -20,7 +20,7 @@ from reflowshock.fem.elements.stress import element_stress
 from reflowshock.fem.errors import MeshError
 from reflowshock.fem.estimates.placement import Role
 from reflowshock.fem.forces.force import ForceTerm
-from reflowshock.fem.forces.force_nonlinear import NonlinearElements, view_by_lane
+from reflowshock.fem.forces.force_nonlinear import NonlinearElements
 from reflowshock.fem.forces.nonlinear_blocks import in_modes
 from reflowshock.fem.loads.pretension import Pretension
 from reflowshock.fem.model.body import Body
@@ -164,13 +164,13 @@ def _set_initial_points(
 ) -> None:
     """Set stress and plastic strain at the integration points of path-dependent elements, padding lanes included."""
     points = HenckyElements.build(term.elements, materials, free_expansion(materials, change)).points(displacement)
-    order, state = term.lanes.element, view_by_lane(term.history["state"])
+    order, state = term.lanes.element, term.lanes.view(term.history["state"])
     state[..., :6] = points.stress[order]
     state[..., 6] = points.plastic_strain[order]
     if "hourglass" in term.history:
         term.history["hourglass"][...] = points.hourglass_energy[order]
     if "slip" in term.history:
-        view_by_lane(term.history["slip"])[...] = -in_modes(points.stretched)[order]
+        term.lanes.view(term.history["slip"])[...] = -in_modes(points.stretched)[order]
 
 
 def _expansion_energy(body: Body, chosen: NDArray[np.bool_], materials: Sequence[Material], change: float) -> float:

@@ -18,8 +18,6 @@ from reflowshock.cases.hard.trials.grids import grid, mesh_of, on
 from reflowshock.fem.dynamics.motion import Motion
 from reflowshock.fem.elements.stress import von_mises
 from reflowshock.fem.forces.force_nonlinear import NonlinearElements
-from reflowshock.fem.kernels.lanes import LANES
-from reflowshock.fem.kernels.nonlinear import PLASTIC
 from reflowshock.fem.mesh.mesh import MeshData, append, without_unused_nodes
 from reflowshock.fem.model.body import Body
 from reflowshock.fem.model.factorisation import Factorisation
@@ -187,13 +185,12 @@ class Measures:
     def _means(self, bounds: tuple[float, float]) -> dict[str, float]:
         blocks, lanes = self._solder.blocks, self._solder.lanes
         chosen = lanes.valid & (self._height > bounds[0]) & (self._height < bounds[1])
-        points = blocks.state.shape[1]
-        state = blocks.state.reshape(len(blocks.state), points, -1, LANES).transpose(0, 3, 1, 2)[chosen]
-        weight = blocks.weight[blocks.pattern].reshape(-1, points, LANES).transpose(0, 2, 1)[chosen]
+        state = lanes.view(blocks.state)[chosen]
+        weight = lanes.view(blocks.weight)[blocks.pattern][chosen][..., 0]
         mises = von_mises(state[..., :6].reshape(-1, 6)).reshape(weight.shape)
         return {
             "von_mises": float(np.average(mises, weights=weight)),
-            "plastic_strain": float(np.average(state[..., PLASTIC // LANES], weights=weight)),
+            "plastic_strain": float(np.average(state[..., 6], weights=weight)),
             "plastic_work": float(blocks.plastic_work[chosen].sum() / weight.sum()),
         }
 
