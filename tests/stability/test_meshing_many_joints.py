@@ -1,4 +1,4 @@
-"""Every tenth of two hundred joints: meshed within limits or rejected with a reason (all: benchmarks/remeshing.py)."""
+"""Samples of two hundred joints: meshed within limits or rejected with a reason (all: benchmarks/remeshing.py)."""
 
 import numpy as np
 import pytest
@@ -12,9 +12,10 @@ from tests.support.many_joints import COUNTS, barrel, mesh, outcome, samples
 LARGEST_ERROR, SMALLEST_JACOBIAN = 3.0e-3, 0.2
 
 
-@pytest.fixture(scope="module")
-def outcomes():
-    return [outcome(sample) for sample in samples(every=10)]
+@pytest.fixture(scope="module", params=[30, pytest.param(10, marks=pytest.mark.long)])
+def outcomes(request):
+    """Return the outcomes of every thirtieth joint of each kind, or of every tenth."""
+    return [outcome(sample) for sample in samples(every=request.param)]
 
 
 @pytest.mark.long
@@ -41,7 +42,7 @@ def test_sweepable_joints_are_swept_and_the_rest_is_filled(outcomes):
 
 
 def test_ends_of_tilted_joints_lie_exactly_in_both_planes():
-    for sample in (sample for sample in samples(every=5) if sample.kind == "tilted"):
+    for sample in (sample for sample in samples(every=10) if sample.kind == "tilted"):
         made, (site,) = mesh(sample), sample.sites
         planes = PadPlanes.fit(sample.surface.points, sample.surface.triangles[sample.surface.boundary == 2])
         head, foot = (made.points[made.facets[f"pad_{side}@{site.name}"]] for side in ("package", "board"))

@@ -126,6 +126,7 @@ def test_a_drop_at_rest_stays_at_rest_with_the_quadratic_basis(rest):
     assert flow.body.pressure.mean() == pytest.approx(exact.pressure, rel=0.01)
 
 
+@pytest.mark.long
 def test_a_drop_at_rest_breaks_up_with_the_linear_basis_as_printed(rest):
     """With a convergent Laplacian the same scheme keeps the drop at rest."""
     flow = continued(rest, "linear")
