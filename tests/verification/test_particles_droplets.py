@@ -181,6 +181,7 @@ def swing(across, viscosity, stretch=1.05, periods=2.5):
     return exact / frequency / fit[1], fit[0] * frequency / decay
 
 
+@pytest.mark.long
 def test_coarse_drop_oscillates_nearly_as_exact():
     period, decay = swing(10, 4e-3, periods=1.5)
     assert period == pytest.approx(1.0, abs=0.1)

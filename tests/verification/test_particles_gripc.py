@@ -49,6 +49,7 @@ def poisson_order(basis):
     return np.polyfit(np.log(1.0 / (np.array(COUNTS) - 1)), np.log(errors), 1)[0], errors
 
 
+@pytest.mark.long
 def test_the_pressure_equation_converges_with_the_quadratic_basis():
     order, errors = poisson_order("quadratic")
     assert order > 1.5

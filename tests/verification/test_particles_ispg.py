@@ -53,6 +53,7 @@ def at_rest(*asked, **wall):
     return metrics, drop.shape.history
 
 
+@pytest.mark.long
 def test_a_cube_without_a_wall_comes_to_rest_as_a_sphere():
     scene, solder = cube(7, 60.0)
     drop = drop_to_rest(scene.model_copy(update={"contact_angle": None}), solder)

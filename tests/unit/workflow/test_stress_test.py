@@ -157,18 +157,8 @@ def test_hangs_and_deaths_are_misses_and_the_rest_goes_on(rods):
 
 
 def test_ctrl_c_ends_a_stress_test_with_a_word(tmp_path):
-    line = [
-        sys.executable,
-        "-m",
-        "reflowshock",
-        "stress-test",
-        "--family",
-        "remesh",
-        "--out",
-        str(tmp_path),
-        "-j",
-        "2",
-    ]
+    cases = [str(HARD / f"remesh_{name}.toml") for name in ("barrel", "tall")]
+    line = [sys.executable, "-m", "reflowshock", "stress-test", *cases, "--out", str(tmp_path), "-j", "2"]
     heed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a shell lets background jobs ignore it
     process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=heed)
     wait_until(lambda: len(psutil.Process(process.pid).children()) > 1)
