@@ -5,6 +5,8 @@ ratios up to 8, flat, distorted and curved interfaces, at the steps that the pro
 is measured as well and is unstable.
 """
 
+from itertools import product
+
 import pytest
 
 from reflowshock.cases.hard.trials.pairs import SCHEMES, Pair
@@ -22,7 +24,7 @@ SAMPLES = {
     "thin": Pair(12, 3.0, 2, height=3, thinnest=0.2),
 }
 TWO_WAY = ("held_velocity", "impulse", "gravouil_combescure", "local_steps")
-HARDEST = {(scheme, sample) for scheme in TWO_WAY for sample in ("stiff", "curved", "thin")} | {("held_velocity", "fast")}
+HARDEST = {("held_velocity", "fast"), *product(TWO_WAY, ("stiff", "curved", "thin"))}
 WINDOWS = [
     pytest.param(scheme, sample, marks=() if (scheme, sample) in HARDEST else pytest.mark.long)
     for scheme in TWO_WAY
