@@ -1,21 +1,25 @@
-"""Set-up of all tests: kernel cache, order of the test files, and shared runs.
+"""Set-up of all tests: kernel cache, garbage collection, collection and order of the test files, and shared runs.
 
 Kernels are compiled into the same folders as by the command. Tests that change a shared run work on copies of it.
 """
 
+import fcntl
+import gc
 import os
 import shutil
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from reflowshock.workflow.process.kernel_folder import choose_kernel_folder
-from tests.support.compiled_once import compile_once
+from tests.support.compiled_once import collect_garbage_rarely, compile_once
 from tests.support.shared_run import shared_run
 
 choose_kernel_folder()
 compile_once()
+collect_garbage_rarely()
 os.environ |= {"OMPI_MCA_mpi_yield_when_idle": "1"}  # workers share the cores: waiting ranks yield
 
 # Two workers begin with the first two: one compiles kernels while the other needs none. Then long files come first, and
@@ -25,6 +29,22 @@ ORDER = (
     "tests/faults/", "tests/mpi/", "tests/stability/", "cases/hard/", "tests/verification/",
     "tests/",
 )  # fmt: skip
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_collection() -> Iterator[None]:
+    """Let one worker compile the modules of the tests, while the others wait to load them."""
+    with Path(__file__).open() as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            fcntl.flock(lock, fcntl.LOCK_SH)
+        yield
+
+
+def pytest_collection_finish() -> None:
+    """Exclude modules and test items from garbage collection."""
+    gc.freeze()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -21,7 +21,7 @@ from reflowshock.workflow.study.study_file import read_study
 from tests.support.workflow_command import SMALL_CASE
 
 SEED = 20261122
-MUTANTS = 240
+MUTANTS = 80
 MOST_SECONDS = 10.0
 FILES = [*templates().values(), SMALL_CASE, SMALL_CASE.parent / "structure.toml"]
 VALUES = (
@@ -87,11 +87,12 @@ def changed(key: str, value: str, draw: random.Random) -> str:
     return f"{key}={value[: number.start()]}{float(number.group()) * draw.choice(FACTORS):.6g}{value[number.end() :]}"
 
 
-def test_any_case_is_planned_or_refused(tmp_path, capsys):
+@pytest.mark.parametrize("mutants", [MUTANTS, pytest.param(3 * MUTANTS, marks=pytest.mark.long)])
+def test_any_case_is_planned_or_refused(tmp_path, capsys, mutants):
     print(f"seed {SEED}")
     draw, path = random.Random(SEED), tmp_path / "case.toml"
     refused = 0
-    for number in range(MUTANTS):
+    for number in range(mutants):
         source = draw.choice(FILES)
         path.write_bytes(mutant(source.read_text(), draw))
         start = time.monotonic()
@@ -103,7 +104,7 @@ def test_any_case_is_planned_or_refused(tmp_path, capsys):
         except Exception as error:
             raise AssertionError(f"mutant {number} of {source}, seed {SEED}:\n{path.read_bytes()!r}") from error
         assert time.monotonic() - start < MOST_SECONDS, f"mutant {number} of {source}, seed {SEED}"
-    assert 0 < refused < MUTANTS
+    assert 0 < refused < mutants
 
 
 @pytest.fixture

@@ -77,7 +77,8 @@ def test_a_change_runs_what_depends_on_it_beside_modules_of_a_users_own(run_fold
         (tmp_path / f"{name}.py").write_text("raise SystemExit('a module of the user was imported')\n")
     shutil.copy(SMALL_CASE, tmp_path / "small.toml")
     monkeypatch.chdir(tmp_path)
-    case = reflowshock.Case.load(Path("small.toml"), {"shock.duration": "0.02 ms"})
+    shorter = {"shock.duration": "0.02 ms", "shock.ranks.total": 1, "shock.numerics.modes": ["two_scale"]}
+    case = reflowshock.Case.load(Path("small.toml"), shorter)
     assert case.run(run_folder, force=True).history
     assert {name for name, time in times(run_folder).items() if time != before[name]} == {"shock", "report"}
 

@@ -8,6 +8,7 @@ import pytest
 
 from tests.support.workflow_command import reflowshock
 
+pytestmark = pytest.mark.long  # one fine joint among coarse ones: test_identical_joints.py
 CRITICAL = ("shock.ranks.total=1", "shock.coupling.fine_joints=critical", "shock.coupling.critical_joints=1")
 
 

@@ -139,6 +139,7 @@ def test_a_stage_that_is_broken_off_leaves_nothing_and_is_redone(run_folder):
 def test_a_reflow_that_is_broken_off_continues_to_the_same_bits(first_run, tmp_path, end, whom):
     folder = tmp_path / "small"
     break_off(command_line("run", folder), folder, end, whom)
+    assert set(times(folder)) == {"geometry"}
     result = reflowshock("run", folder, "--until", "reflow")
     assert result.returncode == 0, result.stderr
     assert "continued from checkpoints" in result.stdout
@@ -150,6 +151,7 @@ def test_a_reflow_that_is_broken_off_continues_to_the_same_bits(first_run, tmp_p
         assert np.array_equal(actual[name].history["energy"], shape.history["energy"])
 
 
+@pytest.mark.long
 def test_a_killed_stage_leaves_nothing(run_folder):
     process = start(run_folder, "shock.peak_acceleration=1000 G")
     wait_until(

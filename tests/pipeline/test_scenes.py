@@ -210,7 +210,7 @@ def test_a_drop_that_finds_no_rest_says_so(tmp_path):
     ("name", "metrics"),
     [
         pytest.param("young_laplace", {"mean_pressure", "roundness"}, marks=pytest.mark.long),
-        ("static_caps", {"base_over_diameter", "height_over_diameter"}),
+        pytest.param("static_caps", {"base_over_diameter", "height_over_diameter"}, marks=pytest.mark.long),
         ("drop_impact", {"spread_max", "time_of_spread_max"}),
     ],
 )
@@ -236,6 +236,7 @@ def test_drops_are_printed_from_case_file_to_report(tmp_path):
     assert {"part.stl", "height_map.png"} <= {path.name for path in (tmp_path / "run/particles").iterdir()}
 
 
+@pytest.mark.long
 def test_a_drop_freezes_from_case_file_to_report(tmp_path):
     ended = run("frozen_drop", tmp_path / "run", "scale=quick")
     assert "report: " in ended.stdout, ended.stderr
@@ -248,8 +249,12 @@ def test_a_drop_freezes_from_case_file_to_report(tmp_path):
     ("name", "settings", "metrics"),
     [
         ("dam_break", ("dam_break.duration=0.05 s",), {"particles_lost", "energy_rise"}),
-        ("poiseuille", ("poiseuille.duration=0.02",), {"profile_error_at_end", "reynolds"}),
-        ("taylor_green", ("taylor_green.duration=0.1",), {"decay_rate_error", "speed_error"}),
+        pytest.param(
+            "poiseuille", ("poiseuille.duration=0.02",), {"profile_error_at_end", "reynolds"}, marks=pytest.mark.long
+        ),
+        pytest.param(
+            "taylor_green", ("taylor_green.duration=0.1",), {"decay_rate_error", "speed_error"}, marks=pytest.mark.long
+        ),
     ],
 )
 def test_a_flow_goes_from_case_file_to_report(tmp_path, name, settings, metrics):

@@ -47,6 +47,11 @@ def run(slurm: OneNode, line: list[str]) -> subprocess.CompletedProcess:
     return subprocess.run(line, env=slurm.environment, capture_output=True, text=True, timeout=400, check=False)
 
 
+def warm_run(slurm: OneNode, line: list[str]) -> subprocess.CompletedProcess:
+    """Run a command that submits nothing, without start-up time."""
+    return warm_command(*line[3:], environment=slurm.environment)
+
+
 def metrics(folder: Path) -> dict[str, object]:
     """Return the metrics in the summary of a run folder without timings, name -> value."""
     metrics_by_name = json.loads((folder / "summary.json").read_text())["metrics"]
@@ -80,7 +85,7 @@ def test_stages_are_jobs_with_ranks_and_products_those_of_a_local_run(slurm, tmp
     assert here.returncode == 0, here.stdout + here.stderr
     assert metrics(tmp_path / "jobs") == metrics(tmp_path / "local")
 
-    assert "nothing to do" in run(slurm, line).stdout
+    assert "nothing to do" in warm_run(slurm, line).stdout
     assert len(slurm.queue()) == len(jobs)
 
 
@@ -102,7 +107,7 @@ def test_killed_command_leaves_no_job(slurm, tmp_path, end):
 
 def test_what_is_impossible_is_said_before_anything_is_submitted(slurm, tmp_path):
     jobs = len(slurm.queue())
-    wrong = run(slurm, command(slurm, STRUCTURE, tmp_path / "run", ("dynamics.ranks=64",)))
+    wrong = warm_run(slurm, command(slurm, STRUCTURE, tmp_path / "run", ("dynamics.ranks=64",)))
     assert wrong.returncode == 2
     assert "dynamics.ranks = 64" in wrong.stderr
     assert "partition one has 2 cores" in wrong.stderr
@@ -110,7 +115,7 @@ def test_what_is_impossible_is_said_before_anything_is_submitted(slurm, tmp_path
     (tmp_path / "profile/config.yaml").write_text("default-resources: {slurm_partition: onne}\n")
     other = command(slurm, STRUCTURE, tmp_path / "run", SHORT)
     other[other.index("--profile") + 1] = str(tmp_path / "profile")
-    wrong = run(slurm, other)
+    wrong = warm_run(slurm, other)
     assert wrong.returncode == 2
     assert (
         'default-resources.slurm_partition = "onne": is not a partition here; allowed: one; did you mean one?'

@@ -4,6 +4,7 @@ Workers and ranks that start together need the same kernels; without this each w
 """
 
 import fcntl
+import gc
 import os
 from collections import Counter
 from collections.abc import Iterator
@@ -34,6 +35,11 @@ def compile_once() -> None:
             return compile_alone(self, signature)
 
     Dispatcher.compile = compile_kernel
+
+
+def collect_garbage_rarely() -> None:
+    """Collect garbage after more allocations, also in forks of this process, since compilation leaves little of it."""
+    gc.set_threshold(20_000, 20, 20)
 
 
 @contextmanager

@@ -55,7 +55,7 @@ ELSEWHERE_ON = {
     "flexible": "tests/unit/fem/test_thermal_effects.py::test_warpage_stays_below_its_number",
     "solder_force": "tests/unit/fem/test_thermal_effects.py::test_bending_by_the_solder_stays_below_its_number",
     "one_way": "tests/unit/fem/test_one_way_run.py::test_driven_joint_is_stressed_as_a_coupled_one",
-    "coarse_joints": "tests/pipeline/test_fine_joints.py::test_the_fine_joint_agrees_with_the_dns",
+    "coarse_joints": "tests/pipeline/test_identical_joints.py::test_the_fine_joint_agrees_with_the_dns",
     "identical_joints": "tests/pipeline/test_identical_joints.py::test_what_the_shapes_change_is_told",
     "large_mass": "tests/mpi/test_fem_shock_methods.py::test_large_mass_at_the_holes_is_direct_acceleration",
     "symmetry": "tests/verification/test_fem_thermal_symmetry.py::test_quarter_model_equals_full_model",

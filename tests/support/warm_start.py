@@ -15,11 +15,12 @@ import socket
 import subprocess
 import sys
 import tempfile
+from collections.abc import Mapping
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 
-from tests.support.compiled_once import compile_once
+from tests.support.compiled_once import collect_garbage_rarely, compile_once
 from tests.support.warm_client import ask
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -41,18 +42,23 @@ if words[:1] != ["-m"] or words[1] not in {modules!r}:
     os.execv({python!r}, [{python!r}, *words])
 sys.path.append({support!r})
 from warm_client import ask
-code = ask({address!r}, words[1:], (0, 1, 2))
+request = {{"words": words[1:], "cwd": os.getcwd(), "environment": dict(os.environ)}}
+code = ask({address!r}, request, (0, 1, 2))
 if code < 0:
     os.kill(os.getpid(), -code)
 sys.exit(code)
 """
 
 
-def warm_command(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess:
-    """Run a command of the program, as ``python -m reflowshock`` does, to its end; return the completed process."""
+def warm_command(
+    *arguments: str, cwd: Path | None = None, environment: Mapping[str, str] = os.environ
+) -> subprocess.CompletedProcess:
+    """Run a command of the program to its end, equivalent to ``python -m reflowshock``."""
     with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err, open(os.devnull) as nothing:
         streams = [file.fileno() for file in (nothing, out, err)]
-        code = ask(str(_server() / "socket"), ["reflowshock", *arguments], streams, cwd and str(cwd))
+        words, folder = ["reflowshock", *arguments], str(cwd or Path.cwd())
+        request = {"words": words, "cwd": folder, "environment": dict(environment)}
+        code = ask(str(_server() / "socket"), request, streams)
         said = [file.seek(0) or file.read() for file in (out, err)]
     return subprocess.CompletedProcess(arguments, code, *said)
 
@@ -109,6 +115,7 @@ def serve(client: str, listener: socket.socket) -> None:
     case = read_case(ROOT / "tests/pipeline/small.toml", oversubscribe=True)
     show_plan(Store(Path("nowhere"), one_run=True), Point({}, case), Console(quiet=True))
     compile_once()
+    collect_garbage_rarely()
     numba.njit(lambda value: value)(0)  # loads the parts of Numba for first kernels
     gc.freeze()  # garbage collection would copy shared memory
     while listener in select.select([listener, sys.stdin], [], [])[0]:

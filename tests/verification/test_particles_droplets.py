@@ -25,7 +25,10 @@ def value(result, name):
     return result.metrics[name][0]
 
 
-@pytest.mark.parametrize(("diameter", "tension"), [(93.5e-6, 0.072), (46.75e-6, 0.072), (93.5e-6, 0.036)])
+@pytest.mark.parametrize(
+    ("diameter", "tension"),
+    [(46.75e-6, 0.072), *(pytest.param(93.5e-6, tension, marks=pytest.mark.long) for tension in (0.072, 0.036))],
+)
 def test_pressure_of_a_free_drop_equals_young_laplace(diameter, tension):
     scene = ink(10, 1.0, diameter=diameter, surface_tension=tension)
     result = solve_droplet(scene.model_copy(update={"duration": 0.3 * scene.unit_of_time}))
@@ -181,6 +184,7 @@ def swing(across, viscosity, stretch=1.05, periods=2.5):
     return exact / frequency / fit[1], fit[0] * frequency / decay
 
 
+@pytest.mark.long
 def test_coarse_drop_oscillates_nearly_as_exact():
     period, decay = swing(10, 4e-3, periods=1.5)
     assert period == pytest.approx(1.0, abs=0.1)
@@ -231,7 +235,7 @@ def test_small_tension_changes_little():
     assert spreads[1] == pytest.approx(spreads[0], rel=decision["influence"])
 
 
-@pytest.mark.parametrize("reynolds", [5.0, 100.0])
+@pytest.mark.parametrize("reynolds", [pytest.param(5.0, marks=pytest.mark.long), 100.0])
 def test_hard_impacts_stay_finite_and_on_their_side_of_the_wall(reynolds):
     scene = ink(8, 1.0, weber=100.0, reynolds=reynolds)
     result = solve_droplet(scene.model_copy(update={"duration": 0.6 * scene.unit_of_time}))

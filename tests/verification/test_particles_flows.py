@@ -87,8 +87,11 @@ def test_carreau_liquid_has_the_exact_profile():
 
 @pytest.mark.parametrize(
     ("rheology", "profile"),
-    [(THINNING | {"bound": 4.0}, steady_speeds), (CARREAU, carreau_profile)], ids=["power law", "Carreau"],
-)  # fmt: skip
+    [
+        pytest.param(THINNING | {"bound": 4.0}, steady_speeds, marks=pytest.mark.long, id="power law"),
+        pytest.param(CARREAU, carreau_profile, id="Carreau"),
+    ],
+)
 def test_liquid_whose_viscosity_depends_on_shear_keeps_its_profile(rheology, profile):
     assert error_of_steady_flow(rheology, profile, 10, 0.1) < 0.03
 

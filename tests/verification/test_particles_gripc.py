@@ -50,6 +50,7 @@ def poisson_order(basis):
     return np.polyfit(np.log(1.0 / (np.array(COUNTS) - 1)), np.log(errors), 1)[0], errors
 
 
+@pytest.mark.long
 def test_the_pressure_equation_converges_with_the_quadratic_basis():
     order, errors = poisson_order("quadratic")
     assert order > 1.5
@@ -127,6 +128,7 @@ def test_a_drop_at_rest_stays_at_rest_with_the_quadratic_basis(rest):
     assert flow.body.pressure.mean() == pytest.approx(exact.pressure, rel=0.01)
 
 
+@pytest.mark.long
 def test_a_drop_at_rest_breaks_up_with_the_linear_basis_as_printed(rest):
     """With a convergent Laplacian the same scheme keeps the drop at rest."""
     flow = continued(rest, "linear")

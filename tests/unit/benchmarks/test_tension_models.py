@@ -105,6 +105,7 @@ def test_the_level_of_a_ball_is_a_sphere_and_bends_as_one():
     assert -(across + along) / abs(rise) == pytest.approx(2.0 / radius.mean(), rel=0.03)
 
 
+@pytest.mark.long
 def test_a_surface_without_tension_does_nothing():
     simulation = set_up_drop(DROP, "free-surface pressure")
     points = np.stack(simulation.fields[:3], axis=1)

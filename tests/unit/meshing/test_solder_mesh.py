@@ -134,7 +134,7 @@ def test_a_tilted_face_is_laid_on_the_package_without_a_shear():
 def test_shape_that_is_not_star_shaped_is_refused_by_name():
     the_package = package()
     site = pad_table(the_package, board(), WARPAGE)[0]
-    points, triangles, lower, upper = revolve(np.full(25, 0.24 * MM), site.gap, around=96)
+    points, triangles, lower, upper = revolve(np.full(13, 0.24 * MM), site.gap, around=48)
     bay = np.exp(-((np.arctan2(points[:, 1], points[:, 0]) / 0.15) ** 2)) * np.sin(np.pi * points[:, 2] / site.gap) ** 2
     points[:, 0] -= 0.4 * MM * bay  # a bay that reaches past the axis
     with pytest.raises(JointMeshError, match=r"A3: section is not star-shaped"):

@@ -54,6 +54,7 @@ def test_what_moves_as_a_whole_is_not_touched_and_beside_a_wall_the_image_counts
     assert (drift[2, near] > 0.0).all()  # across the wall it is reversed
 
 
+@pytest.mark.long
 def test_a_drop_rests_with_it_as_without_it():
     pair = [ink(xsph, start="cube") for xsph in (0.0, 0.5)]
     for simulation in pair:

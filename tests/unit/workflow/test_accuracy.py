@@ -242,7 +242,7 @@ def test_failed_checks_and_runs_are_reported(tmp_path, monkeypatch, capsys):
     assert f"Failed runs are not repeated unless you remove {work}." in output.replace("\n", "")
 
 
-@pytest.mark.parametrize(("tolerance", "code"), [("0.2%", 0), ("0.0001%", 1)])
+@pytest.mark.parametrize(("tolerance", "code"), [pytest.param("0.2%", 0, marks=pytest.mark.long), ("0.0001%", 1)])
 def test_command_prints_at_most_a_hundred_columns(tmp_path, monkeypatch, capsys, tolerance, code):
     compute = Fake()
     monkeypatch.setattr(command, "_compute", lambda store, points, **_: compute(store, points))

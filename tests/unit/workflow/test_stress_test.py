@@ -139,9 +139,9 @@ def rods(monkeypatch, tmp_path):
     monkeypatch.setenv("PYTEST_PLUGINS", "tests.support.rods")
     monkeypatch.setattr(command, "HARD", tmp_path)
 
-    def attempt_rods(count=0, **changes):
+    def attempt_rods(count=0, cores=2, **changes):
         (tmp_path / "elements_rod.toml").write_text(hard_case_text(TABLE | changes))
-        survived = stress_test(Request([], ["elements"], count, 1, 2, tmp_path / "out"))
+        survived = stress_test(Request([], ["elements"], count, 1, cores, tmp_path / "out"))
         return survived, json.loads((tmp_path / "out/stress_test.json").read_text())
 
     return attempt_rods
@@ -159,18 +159,8 @@ def test_hangs_and_deaths_are_misses_and_the_rest_goes_on(rods):
 
 
 def test_ctrl_c_ends_a_stress_test_with_a_word(tmp_path):
-    line = [
-        sys.executable,
-        "-m",
-        "reflowshock",
-        "stress-test",
-        "--family",
-        "remesh",
-        "--out",
-        str(tmp_path),
-        "-j",
-        "2",
-    ]
+    cases = [str(HARD / f"remesh_{name}.toml") for name in ("barrel", "tall")]
+    line = [sys.executable, "-m", "reflowshock", "stress-test", *cases, "--out", str(tmp_path), "-j", "2"]
     heed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)  # a shell lets background jobs ignore it
     process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True, start_new_session=True, preexec_fn=heed)
     wait_until(lambda: len(psutil.Process(process.pid).children()) > 1)
@@ -197,7 +187,7 @@ RANDOM = {"draws": "rods", "parameters": {}, "bounds": {"width": "< 7 mm"}}
 
 
 def test_a_random_case_that_misses_is_made_simple_and_is_a_hard_case(rods, tmp_path):
-    survived, report = rods(30, **RANDOM)
+    survived, report = rods(30, cores=1, **RANDOM)
     assert not survived
     (sample,) = report["random"]
     assert sample["tried"] == len(sample["cases"]) == 30
