@@ -3,7 +3,7 @@
 An array over a block of elements is flat, ``a[16 * k + lane]``, with k counting the entries of one element. Loops over
 lanes are innermost, without branches and with constant bounds, so that the compiler vectorises them (not with eight
 lanes, for which it considers the check for overlapping arrays too expensive). A 3 x 3 matrix is nine scalars, row by
-row.
+row; functions of such tuples also take tuples of vectors (``vectors.vector``), which later kernels use instead.
 """
 
 from numba import njit
