@@ -189,7 +189,8 @@ def fails(directory: Path, ranks: int, message: str, **changes) -> None:
 
 
 def test_wrong_number_of_ranks_ends_the_run(assembly):
-    fails(assembly, 3, "asks for 2 ranks (ranks.total), mpirun started 3", mode="two_scale")
+    shock = SHOCK | {"ranks": {"total": 2}}
+    fails(assembly, 3, "asks for 2 ranks (ranks.total), mpirun started 3", mode="two_scale", shock=shock)
 
 
 def test_missing_mesh_ends_all_ranks(assembly):
