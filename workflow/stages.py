@@ -34,7 +34,7 @@ def report(run: Run, folder: Path) -> Findings:
         folder: Folder into which the products of the stage are written.
 
     Returns:
-        Metrics (``value`` and ``unit`` by name), health checks (``value``, ``limit``, ``ok``) and effects.
+        Findings without metrics, health checks or effects, because a report adds none.
     """
     from reflowshock.workflow.pipeline.report import write_report
 

@@ -146,7 +146,7 @@ def linear_divergence(weights, gradient, basis, result):
     Each gradient component is a function of the position in the element; it is fitted by 1, xi, eta, zeta.
 
     Args:
-        weights: Weights of the Gauss points, shape (8,) [m^3].
+        weights: Weights of the Gauss points in the order of ``GAUSS``, shape (8,) [m^3].
         gradient: Gradient of each shape function, Gauss point by node by direction, shape (8, 8, 3) [1/m].
         basis: Workspace of shape (4, 8), overwritten by the orthonormal linear functions at the Gauss points.
         result: Written: linear part of the gradients in the order of ``gradient``, shape (8, 8, 3) [1/m].

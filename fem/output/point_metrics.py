@@ -60,7 +60,7 @@ def _strain_rate(time: NDArray[np.float64], strain: NDArray[np.float64], low_pas
 
 
 def gauge_metrics(arrays: Mapping[str, NDArray], low_pass: LowPass) -> dict[str, Any]:
-    """Return the peaks of strain gauges as metrics, each as ``{"value": ..., "unit": ...}``.
+    """Return the peak magnitudes of strain gauges as metrics, each as ``{"value": ..., "unit": ...}``.
 
     Args:
         arrays: Arrays of ``history.npz``: ``time`` [s], ``gauges`` (names) and ``gauge@<name>`` (strain).

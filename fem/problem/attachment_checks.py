@@ -148,7 +148,7 @@ def position_problems(key: str, point: tuple[float, float, float], structure: St
 
 
 def hole_problems(key: str, point: tuple[float, float, float], structure: Structure) -> Iterator[Problem]:
-    """Yield an input error if a point lies inside a mounting hole.
+    """Yield an input error if a point lies inside a mounting hole, farther from its rim than ``structure.margin``.
 
     Args:
         key: Key of the point in the case file.

@@ -86,7 +86,7 @@ def least_jacobian(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
 
     Args:
         points: Node coordinates, shape (n, 3) [m].
-        cells: Nodes of the tetrahedra, shape (c, 10).
+        cells: Nodes of the tetrahedra in the order of Gmsh (four corners, six midside nodes), shape (c, 10).
 
     Returns:
         Lower bounds, shape (c,); 1 for straight edges with midside nodes in the middle.

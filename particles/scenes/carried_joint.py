@@ -66,8 +66,8 @@ def carry_joint(
         progress: Function called with the fraction done, 0 to 1.
 
     Returns:
-        Wrenches on the pads of board and package, shape (2, 6) [N, N m], and the number of steps; zero for an open
-        joint, including one with too little solder.
+        Force and moment about the pad's centre on board and package, in the joint's frame, shape (2, 6) [N, N m], and
+        the number of steps; zero for an open joint, one with too little solder, or one that broke before.
 
     Raises:
         NotAtRest: The joint is not at rest after ``solder.numerics.max_steps``, or at the end of the process.

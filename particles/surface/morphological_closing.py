@@ -91,10 +91,10 @@ def close_gaps(level: LevelSet, gap: float) -> LevelSet:
 
 
 def smooth_slits(level: LevelSet) -> LevelSet:
-    """Smooth a level set until its triangulation is a manifold: slits narrower than a cell open or close.
+    """Smooth a level set until its triangulation is a manifold, a few times at most: narrow slits open or close.
 
-    Two sheets that cross the same cells share vertices and edges there. A Gaussian of the width of a cell separates or
-    closes them; a level set without slits is returned unchanged.
+    Two sheets that cross the same cells share vertices and edges there. A Gaussian of the width of a cell, applied to
+    the whole level set, separates or closes them; a level set without slits is returned unchanged.
 
     Args:
         level: Values at the nodes of a grid, negative in the liquid; not changed.

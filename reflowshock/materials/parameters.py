@@ -65,7 +65,7 @@ def inadmissible(allowed: str) -> PydanticCustomError:
     """Return a validation error of an elastic constant for which the strain energy is not positive.
 
     Args:
-        allowed: Allowed range of the constant in words, for the message.
+        allowed: Allowed range of the constant in words, in the context of the error as ``allowed``.
     """
     message = "contradicts the values above it: the strain energy would not be positive"
     return PydanticCustomError("inadmissible", message, {"allowed": allowed})

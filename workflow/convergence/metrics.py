@@ -13,14 +13,17 @@ def read_metric_errors(
 ) -> dict[str, Quantity]:
     """Read errors against an exact solution; where a run has none, the value itself, to be compared with finer runs.
 
+    The value is the metric whose name lacks the ending ``_error``.
+
     Args:
-        exact: Name of the exact solution, for readers.
+        exact: Name of the exact solution, stored as the source of each error.
         errors: Name of a metric ending in ``_error`` -> its explanation; only the names are used.
         stage: Stage whose record has the metrics.
         run_folder: Folder of the run, from which the record is read.
 
     Returns:
-        Quantity by name of the error; empty if the stage has no record.
+        Quantity by name of the error, also where it is the value: ``Quantity.exact`` is 0 for an error and None for a
+        value. Empty if the stage has no record.
     """
     record = read_record(run_folder / stage)
     metrics = {} if record is None else record["metrics"]

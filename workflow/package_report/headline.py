@@ -5,7 +5,7 @@ from typing import Any
 
 from reflowshock.fem.problem.shock import Shock
 from reflowshock.workflow.report import tables
-from reflowshock.workflow.report.errors import Discretisation, left_out, scheme_error
+from reflowshock.workflow.report.errors import Discretisation, left_out
 
 FIGURES = (
     ("critical_joint", "critical joint"),
@@ -25,7 +25,7 @@ DISCRETISATION = (
     " Discretisation error: grid convergence index (Roache 1994), 1.25 times the difference from the Richardson limit"
     " of three meshes, or 3 times the difference expected from the theoretical order if they show no order."
 )
-TWO_SCALE = " Two-scale error: difference from one model on the same mesh."
+TWO_SCALE = "difference from one model on the same mesh"
 
 
 def later_swings(shock: Shock, end: float, why: str = "") -> str:
@@ -34,10 +34,11 @@ def later_swings(shock: Shock, end: float, why: str = "") -> str:
     Args:
         shock: Parameters of the shock.
         end: Time at which the run ended [s].
-        why: Reason for the end, if a coarse run decided it.
+        why: Reason for the end of a damped board, if a coarse run decided it; not used for an undamped board.
 
     Returns:
-        Sentence with a leading space; empty if the duration is fixed, or the board is damped and no reason is given.
+        Sentence with a leading space: ``why`` for a damped board, the note on larger swings for an undamped one; empty
+        if the duration is fixed, or the board is damped and no reason is given.
     """
     if shock.duration != "auto":
         return ""
@@ -68,7 +69,7 @@ def headline(metrics: Mapping[str, dict], known: Discretisation, summary: Mappin
             label,
             tables.named_quantity(dict(metrics), name),
             NONE if isinstance(metrics[name]["value"], str) else known.text(name) or NONE,
-            scheme_error(name, results) or NONE,
+            known.two_scale_text(name, results) or NONE,
         ]
         for name, label in FIGURES
         if name in metrics
@@ -76,7 +77,7 @@ def headline(metrics: Mapping[str, dict], known: Discretisation, summary: Mappin
     columns = [0, 1, *(column for column in (2, 3) if any(row[column] != NONE for row in rows))]
     note = f"Neglected effects by expected influence: {left_out(summary['effects'])}."
     note += DISCRETISATION if known.errors else f" The discretisation error is not estimated: {known.unknown}."
-    note += TWO_SCALE if 3 in columns else ""
+    note += f" Two-scale error: {known.two_scale_how or TWO_SCALE}." if 3 in columns or known.two_scale_how else ""
     return {
         "head": [HEAD[column] for column in columns],
         "rows": [[row[column] for column in columns] for row in rows],

@@ -37,6 +37,15 @@ class Discretisation:
             return f"±{percent(self.errors[name])} ({self.how[name]})"
         return self.how.get(name, "")
 
+    def two_scale_text(self, name: str, results: Mapping[str, Mapping[str, Any]]) -> str:
+        """Return the error of two scales of a figure as text: the estimated one, else that of ``scheme_error``.
+
+        Args:
+            name: Name of the metric.
+            results: ``result.json`` of each mode of a drop, the main mode first.
+        """
+        return percent(self.two_scale[name]) if name in self.two_scale else scheme_error(name, results)
+
     def record(self, results: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
         """Return the errors for ``summary.json``, by metric.
 
@@ -68,8 +77,8 @@ def scheme_share(name: str, results: Mapping[str, Mapping[str, Any]]) -> float |
             the second.
 
     Returns:
-        Magnitude of the difference over the value of the DNS; 0 for a DNS alone; None if only one other mode was run,
-        the DNS ended early, or a value is missing.
+        Magnitude of the difference over the value of the DNS; None if only one mode was run, the DNS ended early, a
+        value is missing or not a number, or that of the DNS is zero.
     """
     if len(results) < 2 or _ends_early(results):
         return None
@@ -89,10 +98,12 @@ def scheme_error(name: str, results: Mapping[str, Mapping[str, Any]]) -> str:
 
     Args:
         name: Name of the metric.
-        results: Mode -> content of its ``result.json`` (``model``, ``metrics``, ``health``, ``timings``, ``coupling``).
+        results: Mode -> content of its ``result.json`` (``model``, ``metrics``, ``health``, ``timings``, ``coupling``);
+            the first mode is compared with the second.
 
     Returns:
-        Difference in per cent, or why there is none; empty if only one mode was run.
+        Difference in per cent, or why there is none; "none" for equal texts, such as names of joints; empty if only
+        one mode was run, or a value is missing or zero.
     """
     first, *others = results
     if not others:
