@@ -40,7 +40,8 @@ def run_stage(name: str, function: StageFunction, run: Run, product: Path) -> di
     _check_key(run, stage, before["inputs"], key)
     discard(partial)
     partial.mkdir(parents=True)
-    forecast = stage_seconds(run.case).get(name, 0.0) + compilation_time([name])
+    predicted = stage_seconds(run.case).get(name, 0.0)
+    forecast = predicted + compilation_time([name])
     start, used = time.perf_counter(), core_seconds()
     findings = function(run, partial)
     record = {
@@ -59,7 +60,7 @@ def run_stage(name: str, function: StageFunction, run: Run, product: Path) -> di
     publish(partial, product)
     discard(run.checkpoints(name))
     if name == SHOCK:
-        measure_after(forecast)
+        measure_after(predicted)
     return record
 
 

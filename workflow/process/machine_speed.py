@@ -18,7 +18,7 @@ from reflowshock.workflow.process.kernel_folder import kernel_folder
 from reflowshock.workflow.process.rank_count import core_times, idle_between
 
 FILE = "speed.json"
-LONG = 30.0  # shortest predicted stage after which the machine is measured [s]
+LONG = 60.0  # shortest predicted stage after which the machine is measured [s]
 IDLE = 0.25  # cores that others may use during a measurement
 PATIENCE = 300.0  # [s] for a measurement, most of it for kernels that a case did not need
 UNMEASURED = "Steps are assumed to be as fast as on the reference machine; this machine is measured after a long shock."
@@ -75,7 +75,7 @@ def measure_after(predicted: float) -> None:
     already is a measurement that other programs disturbed little. Errors are ignored.
 
     Args:
-        predicted: Predicted wall time of the shock [s].
+        predicted: Predicted wall time of the shock without compilation [s].
     """
     former, folder = machine_speed(), kernel_folder()
     if predicted < LONG or folder is None or (former is not None and former.busy <= IDLE):
