@@ -21,12 +21,12 @@ SCALE, ENTRIES = 27 * WIDTH, 30 * WIDTH
 
 @njit(**VECTOR_OPTIONS)
 def mean_deformation(k, at, q):
-    """Return the mean deformation gradient F of boxes, nine vectors row by row.
+    """Return the mean deformation gradient F of boxes, a tuple of nine SIMD vectors of ``WIDTH`` lanes, row by row.
 
     Args:
-        k: Pointer to the constants.
-        at: Position of the constants of the pattern.
-        q: Modes, eight tuples (x, y, z) [m].
+        k: Pointer to the constants of all patterns, float64.
+        at: Position of the constants of the pattern behind ``k``, integer.
+        q: Displacement modes of the eight nodes, eight tuples (x, y, z) of three SIMD vectors [m].
     """
     s, x, y, z = three(k, at + SCALE), q[1], q[2], q[4]
     return (
@@ -38,13 +38,16 @@ def mean_deformation(k, at, q):
 
 @njit(**VECTOR_OPTIONS)
 def higher_modes(k, at, q, r):
-    """Return the modes xy, xz, yz, xyz in the rotated frame [m] and the forces on them [N], four tuples each.
+    """Return the modes xy, xz, yz, xyz in the rotated frame [m] and the elastic forces on them [N].
 
     Args:
-        k: Pointer to the constants.
-        at: Position of the constants of the pattern.
-        q: Modes, eight tuples (x, y, z) [m].
-        r: Rotation R, nine vectors row by row.
+        k: Pointer to the constants of all patterns, float64.
+        at: Position of the constants of the pattern behind ``k``, integer.
+        q: Displacement modes of the eight nodes, eight tuples (x, y, z) of three SIMD vectors [m].
+        r: Rotation R, nine SIMD vectors row by row.
+
+    Returns:
+        Modes and forces, each four tuples (x, y, z) of three SIMD vectors of ``WIDTH`` lanes.
     """
     back = transposed(r)
     a, b, c, d = applied(back, q[3]), applied(back, q[5]), applied(back, q[6]), applied(back, q[7])
@@ -54,14 +57,14 @@ def higher_modes(k, at, q, r):
 
 @njit(**VECTOR_OPTIONS)
 def box_forces(k, at, q, r, e):
-    """Return the forces on the modes of boxes, eight tuples (x, y, z) [N].
+    """Return the forces on the modes of boxes, eight tuples (x, y, z) of three SIMD vectors of ``WIDTH`` lanes [N].
 
     Args:
-        k: Pointer to the constants.
-        at: Position of the constants of the pattern.
-        q: Modes, eight tuples (x, y, z) [m].
-        r: Rotation R, nine vectors row by row.
-        e: Strain U - 1, six vectors.
+        k: Pointer to the constants of all patterns, float64.
+        at: Position of the constants of the pattern behind ``k``, integer.
+        q: Displacement modes of the eight nodes, eight tuples (x, y, z) of three SIMD vectors [m].
+        r: Rotation R, nine SIMD vectors row by row.
+        e: Strain U - 1, six SIMD vectors xx, yy, zz, xy, yz, xz with tensor shear.
     """
     (a, b, c, d), (fa, fb, fc, fd) = higher_modes(k, at, q, r)
     none = broadcast(0.0)
@@ -80,8 +83,8 @@ def add_turned_block_forces(blocks, displacement, force):
 
     Args:
         blocks: Four arrays: nodes of blocks in tensor order, where boxes after the last one repeat it, (nb, 8, WIDTH)
-            int32; number of boxes of each block, (nb,) int32; its pattern, (nb,) int32; constants of each pattern,
-            (np, 30 WIDTH).
+            int32; number of boxes of each block, (nb,) int32; its pattern, (nb,) int32; constants of each pattern [J,
+            N/m, 1/m], (np, 30 WIDTH).
         displacement: Nodal displacement, shape (n, 3) [m].
         force: Nodal force, shape (n, 3) [N], subtracted from.
 
@@ -106,7 +109,10 @@ def add_turned_block_forces(blocks, displacement, force):
 def block_energies(blocks, displacement):
     """Return the total energies of mean strains and of higher modes of boxes in blocks, two scalars [J].
 
-    Arguments as in ``add_turned_block_forces``.
+    Args:
+        blocks: Four arrays: nodes of blocks in tensor order, (nb, 8, WIDTH) int32; number of boxes of each block, (nb,)
+            int32; its pattern, (nb,) int32; constants of each pattern [J, N/m, 1/m], (np, 30 WIDTH).
+        displacement: Nodal displacement, shape (n, 3) [m].
     """
     cells, filled, pattern, constants = blocks
     nodes, k, u = place(cells), place(constants), place(displacement)

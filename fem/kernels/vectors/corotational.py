@@ -9,11 +9,11 @@ from reflowshock.fem.kernels.vectors.vector import VECTOR_OPTIONS
 
 @njit(**VECTOR_OPTIONS)
 def stress_of(k, e):
-    """Return the stress times volume T = V C : E as six vectors xx, yy, zz, xy, yz, xz [J].
+    """Return the stress times volume T = V C : E as six SIMD vectors xx, yy, zz, xy, yz, xz [J].
 
     Args:
-        k: V times C_xx, C_yy, C_zz, C_xy, C_yz, C_xz, G_xy, G_yz, G_xz, nine vectors [J].
-        e: Strain E = U - 1, six vectors in the order of the stress, with tensor shear.
+        k: V times C_xx, C_yy, C_zz, C_xy, C_yz, C_xz, G_xy, G_yz, G_xz, nine SIMD vectors of ``WIDTH`` lanes [J].
+        e: Strain E = U - 1, six SIMD vectors xx, yy, zz, xy, yz, xz with tensor shear.
     """
     return (
         k[0] * e[0] + k[3] * e[1] + k[5] * e[2],
@@ -27,20 +27,26 @@ def stress_of(k, e):
 
 @njit(**VECTOR_OPTIONS)
 def twice_energy(k, e):
-    """Return T : E, twice the energy of the mean strain, a vector [J]; arguments as in ``stress_of``."""
+    """Return T : E, twice the energy of the mean strain, a SIMD vector of ``WIDTH`` lanes [J].
+
+    Args:
+        k: Volume V times C_xx, C_yy, C_zz, C_xy, C_yz, C_xz, G_xy, G_yz, G_xz, nine SIMD vectors [J].
+        e: Strain E = U - 1, six SIMD vectors xx, yy, zz, xy, yz, xz with tensor shear.
+    """
     t = stress_of(k, e)
     return t[0] * e[0] + t[1] * e[1] + t[2] * e[2] + 2.0 * (t[3] * e[3] + t[4] * e[4] + t[5] * e[5])
 
 
 @njit(**VECTOR_OPTIONS)
 def force_on_gradient(k, r, e, moment):
-    """Return P = R (T - [w]x), the derivative of the energy by F, nine vectors row by row [J].
+    """Return P = R (T - [w]x), the derivative of the energy by F, nine SIMD vectors row by row [J].
 
     Args:
-        k: Elasticity times volume, as in ``stress_of``.
-        r: Rotation R, nine vectors row by row.
-        e: Strain E = U - 1, six vectors.
-        moment: Moment of the other forces in the rotated frame, three vectors [J].
+        k: Volume V times C_xx, C_yy, C_zz, C_xy, C_yz, C_xz, G_xy, G_yz, G_xz, nine SIMD vectors of ``WIDTH`` lanes
+            [J].
+        r: Rotation R, nine SIMD vectors row by row.
+        e: Strain E = U - 1, six SIMD vectors xx, yy, zz, xy, yz, xz with tensor shear.
+        moment: Moment of the other forces in the rotated frame, tuple (x, y, z) of three SIMD vectors [J].
     """
     t = full(stress_of(k, e))
     m = times(t, full(e))

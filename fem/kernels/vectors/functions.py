@@ -36,7 +36,15 @@ def _called(builder: Any, name: str, arguments: Any) -> Any:
 
 @intrinsic
 def choose(context: Any, a: Any, b: Any, yes: Any, no: Any) -> Any:
-    """Return, lane by lane, ``yes`` where a < b and ``no`` elsewhere; all are vectors."""
+    """Return, lane by lane, ``yes`` where a < b and ``no`` elsewhere, a SIMD vector of ``WIDTH`` lanes.
+
+    Args:
+        context: Typing context of Numba, supplied by its compiler; kernels call ``choose(a, b, yes, no)``.
+        a: First SIMD vector to compare; a lane that is not a number takes ``no``.
+        b: Second SIMD vector to compare.
+        yes: Values where a < b, SIMD vector.
+        no: Values elsewhere, SIMD vector.
+    """
 
     def generate(context: Any, builder: Any, kind: Any, arguments: Any) -> Any:
         return builder.select(builder.fcmp_ordered("<", *arguments[:2]), *arguments[2:])
@@ -46,7 +54,12 @@ def choose(context: Any, a: Any, b: Any, yes: Any, no: Any) -> Any:
 
 @intrinsic
 def root(context: Any, vector: Any) -> Any:
-    """Return the square roots of the lanes of a vector."""
+    """Return the square roots of the lanes of a SIMD vector, a SIMD vector.
+
+    Args:
+        context: Typing context of Numba, supplied by its compiler; kernels call ``root(vector)``.
+        vector: Numbers that are not negative, SIMD vector of ``WIDTH`` lanes.
+    """
 
     def generate(context: Any, builder: Any, kind: Any, arguments: Any) -> Any:
         return _called(builder, "sqrt", arguments)
@@ -56,7 +69,12 @@ def root(context: Any, vector: Any) -> Any:
 
 @intrinsic
 def nearest(context: Any, vector: Any) -> Any:
-    """Return the nearest whole numbers of the lanes of a vector."""
+    """Return the nearest whole numbers of the lanes of a SIMD vector, a SIMD vector of doubles.
+
+    Args:
+        context: Typing context of Numba, supplied by its compiler; kernels call ``nearest(vector)``.
+        vector: Numbers to round, SIMD vector of ``WIDTH`` lanes.
+    """
 
     def generate(context: Any, builder: Any, kind: Any, arguments: Any) -> Any:
         return _called(builder, "rint", arguments)
@@ -66,7 +84,12 @@ def nearest(context: Any, vector: Any) -> Any:
 
 @intrinsic
 def power_of_two(context: Any, vector: Any) -> Any:
-    """Return 2^k of whole numbers k, lane by lane."""
+    """Return 2^k of whole numbers k, lane by lane, a SIMD vector.
+
+    Args:
+        context: Typing context of Numba, supplied by its compiler; kernels call ``power_of_two(vector)``.
+        vector: Whole numbers k from -1022 to 1023 as doubles, SIMD vector of ``WIDTH`` lanes.
+    """
 
     def generate(context: Any, builder: Any, kind: Any, arguments: Any) -> Any:
         shifted = builder.fadd(arguments[0], constant(1.5 * 2.0**MANTISSA))
@@ -78,7 +101,12 @@ def power_of_two(context: Any, vector: Any) -> Any:
 
 @intrinsic
 def split(context: Any, vector: Any) -> Any:
-    """Return k and m with x = 2^k m, m from sqrt(1/2) to sqrt(2), of positive normal numbers x, two vectors."""
+    """Return k and m with x = 2^k m, m from sqrt(1/2) to sqrt(2), two SIMD vectors of doubles.
+
+    Args:
+        context: Typing context of Numba, supplied by its compiler; kernels call ``split(vector)``.
+        vector: Positive normal numbers x, SIMD vector of ``WIDTH`` lanes.
+    """
 
     def generate(context: Any, builder: Any, kind: Any, arguments: Any) -> Any:
         bits, unit = builder.bitcast(arguments[0], LONGS), BIAS << MANTISSA
@@ -92,19 +120,23 @@ def split(context: Any, vector: Any) -> Any:
 
 @njit(**VECTOR_OPTIONS)
 def larger(a, b):
-    """Return the larger of two vectors, lane by lane."""
+    """Return the larger of two SIMD vectors ``a`` and ``b`` of ``WIDTH`` lanes, lane by lane."""
     return choose(a, b, b, a)
 
 
 @njit(**VECTOR_OPTIONS)
 def smaller(a, b):
-    """Return the smaller of two vectors, lane by lane."""
+    """Return the smaller of two SIMD vectors ``a`` and ``b`` of ``WIDTH`` lanes, lane by lane."""
     return choose(a, b, a, b)
 
 
 @njit(**VECTOR_OPTIONS)
 def log(x):
-    """Return ln x of positive normal numbers: x = 2^k m, ln m = 2 artanh((m - 1) / (m + 1)) by its series."""
+    """Return ln x, lane by lane: x = 2^k m, ln m = 2 artanh((m - 1) / (m + 1)) by its series.
+
+    Args:
+        x: Positive normal numbers, SIMD vector of ``WIDTH`` lanes.
+    """
     k, m = split(x)
     s = (m - 1.0) / (m + 1.0)
     z = s * s
@@ -118,13 +150,17 @@ def log(x):
 
 @njit(**VECTOR_OPTIONS)
 def within(x, largest):
-    """Return a vector clipped to +- ``largest``, a vector."""
+    """Return a SIMD vector ``x`` clipped lane by lane to +- ``largest``, a SIMD vector of positive numbers."""
     return smaller(larger(x, -largest), largest)
 
 
 @njit(**VECTOR_OPTIONS)
 def exp(x):
-    """Return e^x, x clipped to +-``LARGEST_EXPONENT``: x = k ln 2 + r, series of e^r to r^12."""
+    """Return e^x, lane by lane: x = k ln 2 + r, series of e^r to r^12.
+
+    Args:
+        x: Exponents, SIMD vector of ``WIDTH`` lanes; clipped to +-``LARGEST_EXPONENT``.
+    """
     x = within(x, broadcast(LARGEST_EXPONENT))
     k = nearest(x * (1.0 / LN2))
     r = x - k * LN2
@@ -139,7 +175,11 @@ def exp(x):
 
 @njit(**VECTOR_OPTIONS)
 def rough_log(x):
-    """Return ln x of positive numbers with an absolute error of at most 4e-5."""
+    """Return ln x, lane by lane, with an absolute error of at most 4e-5.
+
+    Args:
+        x: Positive normal numbers, SIMD vector of ``WIDTH`` lanes.
+    """
     k, m = split(x)
     s = (m - 1.0) / (m + 1.0)
     return k * LN2 + s * (2.0 + s * s * (2.0 / 3.0))
@@ -147,7 +187,11 @@ def rough_log(x):
 
 @njit(**VECTOR_OPTIONS)
 def rough_exp(x):
-    """Return e^x with a relative error of at most 1e-3; x is clipped to +-``LARGEST_EXPONENT``."""
+    """Return e^x, lane by lane, with a relative error of at most 1e-3.
+
+    Args:
+        x: Exponents, SIMD vector of ``WIDTH`` lanes; clipped to +-``LARGEST_EXPONENT``.
+    """
     x = within(x, broadcast(LARGEST_EXPONENT))
     k = nearest(x * (1.0 / LN2))
     r = x - k * LN2

@@ -1,6 +1,7 @@
-"""Intrinsics that move vectors between registers and memory, without checks of bounds or overlap.
+"""Intrinsics that move SIMD vectors between registers and memory, without checks of bounds or overlap.
 
-Arrays are passed on as pointers (``place``): Numba would count a reference to an array at each call.
+Arrays are passed on as pointers (``place``): Numba would count a reference to an array at each call. A position counts
+entries of the array from the pointer on.
 """
 
 from typing import Any
@@ -19,7 +20,12 @@ LINE = 8  # doubles of a cache line
 
 @intrinsic
 def place(context: Any, values: Any) -> Any:
-    """Return the pointer to the first entry of a contiguous array; it is valid while the array exists."""
+    """Return the pointer to the first entry of an array; it is valid while the array exists.
+
+    Args:
+        context: Typing context of Numba, supplied by its compiler; kernels call ``place(values)``.
+        values: Contiguous array of any shape and type.
+    """
 
     def generate(context: Any, builder: Any, kind: Any, arguments: Any) -> Any:
         return context.make_array(kind.args[0])(context, builder, arguments[0]).data
@@ -29,7 +35,13 @@ def place(context: Any, values: Any) -> Any:
 
 @intrinsic
 def load(context: Any, values: Any, at: Any) -> Any:
-    """Return ``WIDTH`` consecutive doubles as a vector; ``values`` is a pointer, ``at`` the position of the first."""
+    """Return ``WIDTH`` consecutive doubles as a SIMD vector.
+
+    Args:
+        context: Typing context of Numba, supplied by its compiler; kernels call ``load(values, at)``.
+        values: Pointer to an array of doubles, from ``place``.
+        at: Position of the first double, integer.
+    """
 
     def generate(context: Any, builder: Any, kind: Any, arguments: Any) -> Any:
         address = builder.bitcast(builder.gep(arguments[0], [arguments[1]]), DOUBLES.as_pointer())
@@ -40,7 +52,14 @@ def load(context: Any, values: Any, at: Any) -> Any:
 
 @intrinsic
 def store(context: Any, values: Any, at: Any, vector: Any) -> Any:
-    """Write a vector to consecutive doubles; ``values`` is a pointer, ``at`` the position of the first."""
+    """Write a SIMD vector to ``WIDTH`` consecutive doubles.
+
+    Args:
+        context: Typing context of Numba, supplied by its compiler; kernels call ``store(values, at, vector)``.
+        values: Pointer to an array of doubles, from ``place``; the array is overwritten there.
+        at: Position of the first double, integer.
+        vector: Values, SIMD vector of ``WIDTH`` lanes.
+    """
 
     def generate(context: Any, builder: Any, kind: Any, arguments: Any) -> Any:
         address = builder.bitcast(builder.gep(arguments[0], [arguments[1]]), DOUBLES.as_pointer())
@@ -58,9 +77,13 @@ def _rows(builder: Any, values: Any, nodes: Any, at: Any) -> list[Any]:
 
 @intrinsic
 def gather(context: Any, values: Any, nodes: Any, at: Any) -> Any:
-    """Return the rows of nodes as three vectors x, y, z.
+    """Return the rows of ``WIDTH`` nodes as a tuple (x, y, z) of three SIMD vectors.
 
-    ``values`` points to nodal vectors (n, 3), ``nodes`` to node numbers; lane i has the node at position ``at + i``.
+    Args:
+        context: Typing context of Numba, supplied by its compiler; kernels call ``gather(values, nodes, at)``.
+        values: Pointer to nodal values of three components, shape (n, 3) float64.
+        nodes: Pointer to node numbers, int32.
+        at: Position of the node of lane 0 in the node numbers, integer; lane i has the node at position ``at + i``.
     """
 
     def generate(context: Any, builder: Any, kind: Any, arguments: Any) -> Any:
@@ -77,7 +100,16 @@ def gather(context: Any, values: Any, nodes: Any, at: Any) -> Any:
 
 @intrinsic
 def subtract(context: Any, values: Any, nodes: Any, at: Any, vectors: Any) -> Any:
-    """Subtract three vectors x, y, z from the rows of nodes, lane by lane; other arguments as in ``gather``."""
+    """Subtract a tuple (x, y, z) of three SIMD vectors from the rows of ``WIDTH`` nodes, lane by lane.
+
+    Args:
+        context: Typing context of Numba, supplied by its compiler; kernels call ``subtract(values, nodes, at,
+            vectors)``.
+        values: Pointer to nodal values of three components, shape (n, 3) float64, subtracted from.
+        nodes: Pointer to node numbers, int32; lanes may have the same node.
+        at: Position of the node of lane 0 in the node numbers, integer; lane i has the node at position ``at + i``.
+        vectors: Values to subtract, tuple (x, y, z) of three SIMD vectors.
+    """
 
     def generate(context: Any, builder: Any, kind: Any, arguments: Any) -> Any:
         x, y, z = cgutils.unpack_tuple(builder, arguments[3], 3)
@@ -96,7 +128,12 @@ def subtract(context: Any, values: Any, nodes: Any, at: Any, vectors: Any) -> An
 
 @intrinsic
 def broadcast(context: Any, value: Any) -> Any:
-    """Return a vector with a scalar in all lanes."""
+    """Return a SIMD vector of ``WIDTH`` lanes with a scalar in all lanes.
+
+    Args:
+        context: Typing context of Numba, supplied by its compiler; kernels call ``broadcast(value)``.
+        value: Scalar, float64.
+    """
 
     def generate(context: Any, builder: Any, kind: Any, arguments: Any) -> Any:
         return spread(builder, arguments[0])
@@ -106,7 +143,13 @@ def broadcast(context: Any, value: Any) -> Any:
 
 @intrinsic
 def all_below(context: Any, vector: Any, limit: Any) -> Any:
-    """Return whether all lanes of a vector are below a scalar; False with a lane that is not a number."""
+    """Return whether all lanes of a SIMD vector are below a scalar; False with a lane that is not a number.
+
+    Args:
+        context: Typing context of Numba, supplied by its compiler; kernels call ``all_below(vector, limit)``.
+        vector: SIMD vector of ``WIDTH`` lanes.
+        limit: Scalar, float64.
+    """
 
     def generate(context: Any, builder: Any, kind: Any, arguments: Any) -> Any:
         below = builder.fcmp_ordered("<", arguments[0], spread(builder, arguments[1]))
@@ -118,7 +161,13 @@ def all_below(context: Any, vector: Any, limit: Any) -> Any:
 
 @intrinsic
 def first_lanes(context: Any, vector: Any, count: Any) -> Any:
-    """Return a vector with zeros after its first ``count`` lanes."""
+    """Return a SIMD vector with zeros after its first ``count`` lanes.
+
+    Args:
+        context: Typing context of Numba, supplied by its compiler; kernels call ``first_lanes(vector, count)``.
+        vector: SIMD vector of ``WIDTH`` lanes.
+        count: Number of lanes that stay, integer.
+    """
 
     def generate(context: Any, builder: Any, kind: Any, arguments: Any) -> Any:
         numbers = ir.Constant(ir.VectorType(LONG, WIDTH), [LONG(lane) for lane in range(WIDTH)])
@@ -130,7 +179,12 @@ def first_lanes(context: Any, vector: Any, count: Any) -> Any:
 
 @intrinsic
 def total(context: Any, vector: Any) -> Any:
-    """Return the sum of all lanes, a scalar."""
+    """Return the sum of all lanes of a SIMD vector, a scalar.
+
+    Args:
+        context: Typing context of Numba, supplied by its compiler; kernels call ``total(vector)``.
+        vector: SIMD vector of ``WIDTH`` lanes.
+    """
 
     def generate(context: Any, builder: Any, kind: Any, arguments: Any) -> Any:
         result = builder.extract_element(arguments[0], INDEX(0))
@@ -143,7 +197,13 @@ def total(context: Any, vector: Any) -> Any:
 
 @intrinsic
 def prefetch(context: Any, values: Any, at: Any) -> Any:
-    """Move the cache line of position ``at`` behind a pointer into the cache; any position is allowed."""
+    """Move the cache line of one entry behind a pointer into the cache; returns nothing and changes no values.
+
+    Args:
+        context: Typing context of Numba, supplied by its compiler; kernels call ``prefetch(values, at)``.
+        values: Pointer to an array, from ``place``.
+        at: Position of the entry, integer; positions outside the array are allowed.
+    """
 
     def generate(context: Any, builder: Any, kind: Any, arguments: Any) -> Any:
         flags = [INDEX(0), INDEX(3), INDEX(1)]  # to read it, in all levels of the cache, as data
@@ -159,32 +219,59 @@ def prefetch(context: Any, values: Any, at: Any) -> Any:
 
 @njit(**VECTOR_OPTIONS)
 def prefetch_range(values, at, count):
-    """Move ``count`` doubles from position ``at`` on behind a pointer into the cache."""
+    """Move doubles behind a pointer into the cache; returns nothing and changes no values.
+
+    Args:
+        values: Pointer to an array of doubles, from ``place``.
+        at: Position of the first double, integer.
+        count: Number of doubles, integer.
+    """
     for k in range(at, at + count, LINE):
         prefetch(values, k)
 
 
 @njit(**VECTOR_OPTIONS)
 def three(values, at):
-    """Return three vectors that follow each other in memory; ``values`` is a pointer, ``at`` the first position."""
+    """Return three SIMD vectors of ``WIDTH`` lanes that follow each other in memory, a tuple.
+
+    Args:
+        values: Pointer to an array of doubles, from ``place``.
+        at: Position of the first double, integer.
+    """
     return load(values, at), load(values, at + WIDTH), load(values, at + 2 * WIDTH)
 
 
 @njit(**VECTOR_OPTIONS)
 def six(values, at):
-    """Return six vectors that follow each other in memory; ``values`` is a pointer, ``at`` the first position."""
+    """Return six SIMD vectors of ``WIDTH`` lanes that follow each other in memory, a tuple.
+
+    Args:
+        values: Pointer to an array of doubles, from ``place``.
+        at: Position of the first double, integer.
+    """
     return three(values, at) + three(values, at + 3 * WIDTH)
 
 
 @njit(**VECTOR_OPTIONS)
 def nine(values, at):
-    """Return nine vectors that follow each other in memory; ``values`` is a pointer, ``at`` the first position."""
+    """Return nine SIMD vectors of ``WIDTH`` lanes that follow each other in memory, a tuple.
+
+    Args:
+        values: Pointer to an array of doubles, from ``place``.
+        at: Position of the first double, integer.
+    """
     return six(values, at) + three(values, at + 6 * WIDTH)
 
 
 @njit(**VECTOR_OPTIONS)
 def put_three(values, at, vectors):
-    """Write three vectors one after the other; ``values`` is a pointer, ``at`` the first position."""
+    """Write three SIMD vectors one after the other to ``3 WIDTH`` consecutive doubles.
+
+    Args:
+        values: Pointer to an array of doubles, from ``place``; the array is overwritten there.
+        at: Position of the first double, integer.
+        vectors: Tuple of three SIMD vectors.
+    """
     store(values, at, vectors[0])
     store(values, at + WIDTH, vectors[1])
     store(values, at + 2 * WIDTH, vectors[2])
@@ -192,6 +279,12 @@ def put_three(values, at, vectors):
 
 @njit(**VECTOR_OPTIONS)
 def put_six(values, at, vectors):
-    """Write six vectors one after the other; ``values`` is a pointer, ``at`` the first position."""
+    """Write six SIMD vectors one after the other to ``6 WIDTH`` consecutive doubles.
+
+    Args:
+        values: Pointer to an array of doubles, from ``place``; the array is overwritten there.
+        at: Position of the first double, integer.
+        vectors: Tuple of six SIMD vectors.
+    """
     put_three(values, at, vectors[:3])
     put_three(values, at + 3 * WIDTH, vectors[3:])

@@ -1,7 +1,7 @@
-"""Walsh-Hadamard modes of the corners of hexahedra, for vectors of elements.
+"""Walsh-Hadamard modes of the corners of ``WIDTH`` hexahedra, one in each lane of a SIMD vector.
 
-The mode of parity p (bit d: odd along direction d) has the value sum over corners a of (-1)^|p & a| v_a, three vectors
-x, y, z; the modes are eight such tuples in the order of p.
+The mode of parity p (bit d: odd along direction d) has the value sum over corners a of (-1)^|p & a| v_a, a tuple (x, y,
+z) of three SIMD vectors; the modes are eight such tuples in the order of p: 1, x, y, xy, z, xz, yz, xyz.
 """
 
 from numba import njit
@@ -12,31 +12,38 @@ from reflowshock.fem.kernels.vectors.vector import VECTOR_OPTIONS, WIDTH
 
 @njit(**VECTOR_OPTIONS)
 def plus(a, b):
-    """Return a + b; all are three vectors x, y, z."""
+    """Return the sum a + b of two tuples (x, y, z) of three SIMD vectors each, a tuple of three SIMD vectors."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @njit(**VECTOR_OPTIONS)
 def minus(a, b):
-    """Return a - b; all are three vectors x, y, z."""
+    """Return the difference a - b of two tuples (x, y, z) of three SIMD vectors each, a tuple of three SIMD vectors."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @njit(**VECTOR_OPTIONS)
 def scaled(factor, a):
-    """Return a vector times a tuple (x, y, z) of vectors."""
+    """Return ``factor``, one SIMD vector, times ``a``, a tuple (x, y, z) of three SIMD vectors; again such a tuple."""
     return factor * a[0], factor * a[1], factor * a[2]
 
 
 @njit(**VECTOR_OPTIONS)
 def dot(a, b):
-    """Return the scalar product of two tuples (x, y, z) of vectors, a vector."""
+    """Return a . b, one SIMD vector; ``a`` and ``b`` are tuples (x, y, z) of three SIMD vectors each."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(**VECTOR_OPTIONS)
 def transform(v):
-    """Return the Walsh-Hadamard transform of eight tuples (x, y, z) of vectors, which is its own transpose."""
+    """Return the Walsh-Hadamard transform of eight corner values, which is its own transpose.
+
+    Args:
+        v: Values at the corners in tensor order (x fastest), eight tuples (x, y, z) of three SIMD vectors, any unit.
+
+    Returns:
+        Modes 1, x, y, xy, z, xz, yz, xyz, eight tuples (x, y, z) of three SIMD vectors in the same unit.
+    """
     a, b, c, d = plus(v[0], v[1]), minus(v[0], v[1]), plus(v[2], v[3]), minus(v[2], v[3])
     e, f, g, h = plus(v[4], v[5]), minus(v[4], v[5]), plus(v[6], v[7]), minus(v[6], v[7])
     a, b, c, d = plus(a, c), plus(b, d), minus(a, c), minus(b, d)
@@ -46,12 +53,12 @@ def transform(v):
 
 @njit(**VECTOR_OPTIONS)
 def read_modes(values, cells, b):
-    """Return the modes of the elements of a block, eight tuples (x, y, z).
+    """Return the modes 1, x, y, xy, z, xz, yz, xyz of the elements of a block, eight tuples of three SIMD vectors.
 
     Args:
-        values: Pointer to nodal vectors (n, 3), such as displacements [m].
+        values: Pointer to nodal values of three components, shape (n, 3), such as displacements [m].
         cells: Pointer to the nodes of blocks, node a of element e of block b at ``WIDTH (8 b + a) + e``, int32.
-        b: Number of the block.
+        b: Number of the block, integer.
     """
     at = 8 * WIDTH * b
     return transform(
@@ -70,20 +77,25 @@ def read_modes(values, cells, b):
 
 @njit(**VECTOR_OPTIONS)
 def only_first(v, count):
-    """Return three vectors with zeros after their first ``count`` lanes."""
+    """Return a tuple of three SIMD vectors with zeros after the first ``count`` lanes.
+
+    Args:
+        v: Tuple (x, y, z) of three SIMD vectors of ``WIDTH`` lanes.
+        count: Number of lanes that stay, integer.
+    """
     return first_lanes(v[0], count), first_lanes(v[1], count), first_lanes(v[2], count)
 
 
 @njit(**VECTOR_OPTIONS)
 def subtract_modes(values, cells, b, count, forces):
-    """Subtract forces on the modes of the elements of a block from nodal vectors.
+    """Subtract forces on the modes of the elements of a block from nodal values.
 
     Args:
-        values: Pointer to nodal vectors (n, 3), such as forces [N].
-        cells: Pointer to the nodes of blocks, as in ``read_modes``.
-        b: Number of the block.
-        count: Number of leading elements that are subtracted; the others repeat the last of them.
-        forces: Forces on the modes, eight tuples (x, y, z).
+        values: Pointer to nodal values of three components, shape (n, 3), such as forces [N], subtracted from.
+        cells: Pointer to the nodes of blocks, node a of element e of block b at ``WIDTH (8 b + a) + e``, int32.
+        b: Number of the block, integer.
+        count: Number of leading elements that are subtracted, integer; the others repeat the last of them.
+        forces: Forces on the modes 1, x, y, xy, z, xz, yz, xyz, eight tuples (x, y, z) of three SIMD vectors.
     """
     at = 8 * WIDTH * b
     v = transform(forces)

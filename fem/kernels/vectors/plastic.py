@@ -22,7 +22,8 @@ def law_at(plastic, material, step):
     """Return the constants of the plastic law of a material for steps of a length.
 
     Args:
-        plastic: Pointer to the constants of the materials, six each, see ``materials.plasticity.plastic_constants``.
+        plastic: Pointer to the constants of the materials, six each: 3 G, A, B [Pa], exponent n, rate sensitivity C and
+            reference rate [1/s] (Johnson and Cook).
         material: Index of the material, integer.
         step: Time step dt, scalar [s]; infinity means quasi-static.
 
@@ -39,22 +40,27 @@ def law_at(plastic, material, step):
 
 @njit(**VECTOR_OPTIONS)
 def hardened_by(strain, law):
-    """Return the hardening B p^n [Pa] at plastic strains p, a vector; ``law`` as ``law_at`` returns it."""
+    """Return the hardening B p^n, a SIMD vector of ``WIDTH`` lanes [Pa].
+
+    Args:
+        strain: Equivalent plastic strain p, SIMD vector.
+        law: Constants of ``law_at``, six scalars; the third is B [Pa], the fourth n.
+    """
     return law[2] * exp(law[3] * log(larger(strain, broadcast(TINY))))
 
 
 @njit(**VECTOR_OPTIONS)
 def started(above, before, law):
-    """Return y = ln(x / reference) to start Newton's method with, and its upper bound.
+    """Return y = ln(x / reference) to start Newton's method with, and its upper bound, two SIMD vectors.
 
-    Without hardening within the step 3 G x + Y C y = q - Y. With y_r = (q - Y) / (C Y), where only the rate limits x,
-    and y_c, where only the stiffness does, y = y_r - W(y_r exp(y_r - y_c)); W is Lambert's function to 1 % (Iacono &
-    Boyd, Adv. Comput. Math. 43, 2017).
+    The unknown x is the increment of the plastic strain. Without hardening within the step 3 G x + Y C y = q - Y. With
+    y_r = (q - Y) / (C Y), where only the rate limits x, and y_c, where only the stiffness does, y = y_r - W(y_r exp(y_r
+    - y_c)); W is Lambert's function to 1 % (Iacono & Boyd, Adv. Comput. Math. 43, 2017).
 
     Args:
-        above: Trial von Mises stress above the static yield stress, a vector [Pa].
-        before: Hardening before the step, a vector [Pa].
-        law: Constants of ``law_at``.
+        above: Trial von Mises stress above the static yield stress q - Y, SIMD vector [Pa].
+        before: Hardening before the step, SIMD vector [Pa].
+        law: Constants of ``law_at``, six scalars: 3 G, first yield stress, B [Pa], n, C, reference increment.
     """
     none = broadcast(0.0)
     ceiling = rough_log(larger(above, broadcast(TINY)) * (1.0 / (law[0] * law[5])))
@@ -68,12 +74,12 @@ def started(above, before, law):
 
 @njit(**VECTOR_OPTIONS)
 def plastic_strains(trial, strain, law):
-    """Return the increments x of the plastic strain of implicit radial return, 0 where a point does not yield.
+    """Return the increments x of the plastic strain by implicit radial return, a SIMD vector; 0 without yielding.
 
     Args:
-        trial: Von Mises stress of the elastic trial state, a vector [Pa].
-        strain: Plastic strain before the step, a vector.
-        law: Constants of ``law_at``.
+        trial: Von Mises stress of the elastic trial state, SIMD vector of ``WIDTH`` lanes [Pa].
+        strain: Plastic strain before the step, SIMD vector.
+        law: Constants of ``law_at``, six scalars: 3 G, first yield stress, B [Pa], n, C, reference increment.
     """
     none, one = broadcast(0.0), broadcast(1.0)
     before = hardened_by(strain, law)
@@ -105,14 +111,17 @@ def plastic_strains(trial, strain, law):
 
 @njit(**VECTOR_OPTIONS)
 def returned(s, d, trial, flow, stiffness):
-    """Return stresses returned to the yield surface (six vectors [Pa]) and the plastic work density [J/m^3].
+    """Return stresses to the yield surface, and compute the plastic work.
 
     Args:
-        s: Elastic trial stress, six vectors xx, yy, zz, xy, yz, xz [Pa].
-        d: Strain increment in this order with engineering shear, six vectors.
-        trial: Von Mises stress of the trial state, a vector [Pa].
-        flow: Increment of the plastic strain, a vector.
+        s: Elastic trial stress, six SIMD vectors xx, yy, zz, xy, yz, xz [Pa].
+        d: Strain increment in this order with engineering shear, six SIMD vectors.
+        trial: Von Mises stress of the trial state, SIMD vector [Pa].
+        flow: Increment of the plastic strain, SIMD vector; where it is 0 the stress stays.
         stiffness: 3 G with the shear modulus G, scalar [Pa].
+
+    Returns:
+        Stress on the yield surface, six SIMD vectors in this order [Pa], and plastic work density, SIMD vector [J/m^3].
     """
     p, divisor = (s[0] + s[1] + s[2]) * (1.0 / 3.0), larger(trial, broadcast(TINY))
     raised = (s[0] - p) * d[0] + (s[1] - p) * d[1] + (s[2] - p) * d[2] + s[3] * d[3] + s[4] * d[4] + s[5] * d[5]

@@ -19,10 +19,14 @@ POLAR_CONVERGED = 1e-18  # squared change after which the next one is below roun
 
 @njit(**VECTOR_OPTIONS)
 def polar(f):
-    """Return R (nine vectors row by row), E = U - 1 (six: xx, yy, zz, xy, yz, xz), and whether det F > 0 everywhere.
+    """Return rotation R and strain E = U - 1 of F = R U, and whether det F > 0 in all lanes.
 
     Args:
-        f: Deformation gradient F, nine vectors row by row.
+        f: Deformation gradient F, nine SIMD vectors of ``WIDTH`` lanes, row by row.
+
+    Returns:
+        R, nine SIMD vectors row by row; E, six SIMD vectors xx, yy, zz, xy, yz, xz with tensor shear; and a boolean. If
+        it is False, R and E are meaningless.
     """
     a = metric_change(f)
     square = a[0] * a[0] + a[1] * a[1] + a[2] * a[2] + 2.0 * (a[3] * a[3] + a[4] * a[4] + a[5] * a[5])
@@ -38,7 +42,11 @@ def polar(f):
 
 @njit(**VECTOR_OPTIONS)
 def metric_change(f):
-    """Return F^T F - 1 as six vectors xx, yy, zz, xy, yz, xz; ``f`` is F, nine vectors row by row."""
+    """Return F^T F - 1 as six SIMD vectors xx, yy, zz, xy, yz, xz.
+
+    Args:
+        f: Deformation gradient F, nine SIMD vectors of ``WIDTH`` lanes, row by row.
+    """
     return (
         f[0] * f[0] + f[3] * f[3] + f[6] * f[6] - 1.0,
         f[1] * f[1] + f[4] * f[4] + f[7] * f[7] - 1.0,
@@ -51,11 +59,11 @@ def metric_change(f):
 
 @njit(**VECTOR_OPTIONS)
 def by_series(f, a):
-    """Return R and E = U - 1 of small strains.
+    """Return R and E = U - 1 of small strains: nine SIMD vectors row by row, and six xx, yy, zz, xy, yz, xz.
 
     Args:
-        f: Deformation gradient F, nine vectors row by row.
-        a: F^T F - 1, six vectors xx, yy, zz, xy, yz, xz.
+        f: Deformation gradient F, nine SIMD vectors row by row.
+        a: F^T F - 1, six SIMD vectors xx, yy, zz, xy, yz, xz.
     """
     minors = cofactor_symmetric(a)
     i1, i2 = a[0] + a[1] + a[2], minors[0] + minors[1] + minors[2]
@@ -78,12 +86,12 @@ def by_series(f, a):
 
 @njit(**VECTOR_OPTIONS)
 def times_a(c, constant, i):
-    """Return the coefficients of A (p + q A + r A^2), three vectors.
+    """Return the coefficients of 1, A, A^2 of the product A (p + q A + r A^2), three SIMD vectors.
 
     Args:
-        c: Coefficients p, q, r, three vectors.
-        constant: Scalar that is added to p.
-        i: Invariants i_1, i_2, i_3 of A, three vectors.
+        c: Coefficients p, q, r, three SIMD vectors.
+        constant: Scalar that is added to p before the product.
+        i: Invariants i_1, i_2, i_3 of A, three SIMD vectors.
     """
     p = c[0] + constant
     return c[2] * i[2], p - c[2] * i[1], c[1] + c[2] * i[0]
@@ -91,13 +99,13 @@ def times_a(c, constant, i):
 
 @njit(**VECTOR_OPTIONS)
 def polynomial(c, a, minors, i):
-    """Return p + q A + r A^2 as six vectors, with A^2 = i_1 A - i_2 + cof A.
+    """Return p + q A + r A^2 as six SIMD vectors xx, yy, zz, xy, yz, xz, with A^2 = i_1 A - i_2 + cof A.
 
     Args:
-        c: Coefficients p, q, r, three vectors.
-        a: Symmetric matrix A, six vectors xx, yy, zz, xy, yz, xz.
-        minors: Its cofactor matrix, six vectors.
-        i: Its invariants i_1, i_2, i_3, three vectors.
+        c: Coefficients p, q, r, three SIMD vectors.
+        a: Symmetric matrix A, six SIMD vectors xx, yy, zz, xy, yz, xz.
+        minors: Cofactor matrix of A, six SIMD vectors in this order.
+        i: Invariants i_1, i_2, i_3 of A, three SIMD vectors.
     """
     d, g, r = c[0] - c[2] * i[1], c[1] + c[2] * i[0], c[2]
     return (
@@ -112,7 +120,11 @@ def polynomial(c, a, minors, i):
 
 @njit(**VECTOR_OPTIONS)
 def by_newton(f):
-    """Return the rotation R of F, nine vectors row by row each; det F must be positive."""
+    """Return the rotation R of F by Newton's iteration, nine SIMD vectors row by row.
+
+    Args:
+        f: Deformation gradient F, nine SIMD vectors row by row; det F must be positive in all lanes.
+    """
     x = f
     for _ in range(POLAR_ITERATIONS):
         c = cofactor(x)
@@ -135,7 +147,12 @@ def by_newton(f):
 
 @njit(**VECTOR_OPTIONS)
 def strain(r, f):
-    """Return U - 1 = R^T F - 1, made symmetric, as six vectors; ``r``, ``f``: nine vectors row by row each."""
+    """Return U - 1 = R^T F - 1, made symmetric, as six SIMD vectors xx, yy, zz, xy, yz, xz with tensor shear.
+
+    Args:
+        r: Rotation R, nine SIMD vectors of ``WIDTH`` lanes, row by row.
+        f: Deformation gradient F, nine SIMD vectors row by row.
+    """
     return (
         r[0] * f[0] + r[3] * f[3] + r[6] * f[6] - 1.0,
         r[1] * f[1] + r[4] * f[4] + r[7] * f[7] - 1.0,

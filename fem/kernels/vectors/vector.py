@@ -1,8 +1,8 @@
-"""Numba type of ``WIDTH`` doubles, one for each of as many elements, and its arithmetic.
+"""Numba type of a SIMD vector: ``WIDTH`` doubles (lanes), one for each of as many elements, and its arithmetic.
 
-A kernel reads a vector with ``memory.load`` and then writes ``a * b + c`` as for scalars: the compiler emits vector
-instructions, keeps values in registers and need not prove that arrays do not overlap, as it must in a loop over lanes.
-Functions of tuples of scalars, such as ``kernels.lanes.times``, also take tuples of vectors.
+A kernel reads a SIMD vector with ``memory.load`` and then writes ``a * b + c`` as for scalars: the compiler emits
+vector instructions, keeps values in registers and need not prove that arrays do not overlap, as it must in a loop over
+lanes. Functions of tuples of scalars, such as ``kernels.lanes.times``, also take tuples of SIMD vectors.
 """
 
 import operator
@@ -22,7 +22,7 @@ DOUBLES = ir.VectorType(ir.DoubleType(), WIDTH)
 
 
 class Vector(types.Type):
-    """Type of ``WIDTH`` doubles."""
+    """Numba type of a SIMD vector of ``WIDTH`` doubles; kernels see its only instance, ``VECTOR``."""
 
     def __init__(self) -> None:
         """Name the type."""
@@ -34,7 +34,7 @@ VECTOR = Vector()
 
 @register_model(Vector)
 class VectorModel(models.PrimitiveModel):
-    """A vector is one value of the vector type of the compiler."""
+    """Representation of the Numba type ``Vector`` in memory: one value of LLVM's vector type."""
 
     def __init__(self, manager: Any, kind: Any) -> None:
         """Declare the representation."""
@@ -42,12 +42,21 @@ class VectorModel(models.PrimitiveModel):
 
 
 def constant(value: float) -> ir.Constant:
-    """Return a vector with the same value in all lanes, known to the compiler."""
+    """Return an LLVM constant, a SIMD vector of ``WIDTH`` lanes with the same value in all of them.
+
+    Args:
+        value: Value of each lane.
+    """
     return ir.Constant(DOUBLES, [ir.Constant(ir.DoubleType(), value)] * WIDTH)
 
 
 def spread(builder: Any, value: Any) -> Any:
-    """Return a vector with the scalar ``value`` in all lanes; vectors are returned unchanged."""
+    """Generate the LLVM code that copies a scalar to all ``WIDTH`` lanes of a SIMD vector, and return its LLVM value.
+
+    Args:
+        builder: LLVM instruction builder (``llvmlite.ir.IRBuilder``), to which instructions are appended.
+        value: LLVM value, a scalar; SIMD vectors are returned unchanged.
+    """
     if isinstance(value.type, ir.VectorType):
         return value
     unknown = ir.Constant(ir.VectorType(value.type, WIDTH), ir.Undefined)
