@@ -103,9 +103,12 @@ def transform_corners(w):
 
 @njit(**LANE_OPTIONS)
 def write_deformation(k, w):
-    """Write the mean deformation gradients F of sixteen boxes; ``k (480,)``: constants by ``spread_shape``.
+    """Write the mean deformation gradients F of sixteen boxes to the workspace.
 
-    ``w (672,)``: reads mode p of box e at ``16 (3 p + c) + e`` [m], writes F, row by row, at ``384 + 16 i + e``.
+    Args:
+        k: Constants, shape (480,): entry i of box e at ``16 i + e``; 27 elastic ones, then -1 / (4 h) in x, y, z [1/m].
+        w: Workspace (672,): reads mode p of box e at ``16 (3 p + c) + e`` [m], writes F, row by row, at ``384 + 16 i +
+            e``.
     """
     for lane in range(LANES):
         scale, x, y, z = three(k, SCALE + lane), three(w, X + lane), three(w, Y + lane), three(w, Z + lane)
@@ -137,10 +140,16 @@ def stress(k, u):
 
 @njit(**LANE_OPTIONS)
 def resistance(k, a, b, c, d):
-    """Return the elastic forces Q^ [N] on the modes xy, xz, yz, xyz of one box, four tuples of three scalars.
+    """Return the elastic forces Q^ [N] on the modes xy, xz, yz, xyz, four tuples (x, y, z).
 
-    ``k``: the 27 scalars of ``box_constants`` [J, N/m]; ``a`` to ``d``: three scalars each, amplitudes of the modes
-    [m].
+    All entries are scalars of one box, or all are SIMD vectors of several boxes.
+
+    Args:
+        k: Constants: volume times elasticity, 9 entries [J], then the stiffness of these modes, 18 entries [N/m].
+        a: Amplitude of the mode xy, tuple (x, y, z) [m].
+        b: Amplitude of the mode xz, tuple (x, y, z) [m].
+        c: Amplitude of the mode yz, tuple (x, y, z) [m].
+        d: Amplitude of the mode xyz, tuple (x, y, z) [m].
     """
     return (
         (k[18] * a[0] + k[19] * c[2], k[15] * a[1] + k[16] * b[2], k[11] * c[0] + k[13] * b[1] + k[14] * a[2]),
@@ -152,13 +161,18 @@ def resistance(k, a, b, c, d):
 
 @njit(**LANE_OPTIONS)
 def add_cross(m, a, b):
-    """Return m + a x b of the vectors m, a and b; all are three scalars."""
+    """Return m + a x b, a tuple (x, y, z); all arguments are tuples of three scalars, or of three SIMD vectors."""
     return m[0] + a[1] * b[2] - a[2] * b[1], m[1] + a[2] * b[0] - a[0] * b[2], m[2] + a[0] * b[1] - a[1] * b[0]
 
 
 @njit(**LANE_OPTIONS)
 def spin(u, moment):
-    """Return w, three scalars, with (tr(U) 1 - U) w = ``moment``, three scalars; ``u`` is U: xx, yy, zz, xy, yz, xz."""
+    """Return w with (tr(U) 1 - U) w = ``moment``, a tuple (x, y, z); entries are scalars, or all SIMD vectors.
+
+    Args:
+        u: Stretch U, six entries xx, yy, zz, xy, yz, xz.
+        moment: Right-hand side, tuple (x, y, z) [J]; w has the same unit.
+    """
     t = u[1] + u[2], u[0] + u[2], u[0] + u[1], -u[3], -u[4], -u[5]
     c = cofactor_symmetric(t)
     s = 1.0 / (t[0] * c[0] + t[3] * c[3] + t[5] * c[5])
@@ -169,7 +183,9 @@ def spin(u, moment):
 def resist(k, w):
     """Replace the modes xy, xz, yz, xyz of sixteen boxes by the forces on them [N]; write their moments [J] to mode 0.
 
-    ``w (672,)``: p = 3, 5, 6, 7 at ``16 (3 p + c) + e``, rotations R at ``528 + 16 i + e``; ``k`` by ``spread_shape``.
+    Args:
+        k: Constants, shape (480,): entry i of box e at ``16 i + e``; 27 elastic ones [J, N/m] come first.
+        w: Workspace (672,): modes p = 3, 5, 6, 7 at ``16 (3 p + c) + e`` [m], rotations R at ``528 + 16 i + e``.
     """
     for lane in range(LANES):
         back = transposed(nine(w, ROTATION + lane))
@@ -188,8 +204,10 @@ def resist(k, w):
 def write_stress(k, w):
     """Replace deformation gradients F of sixteen boxes by nominal stresses times volume P [J], the forces on F.
 
-    ``w (672,)``: F, then P, of box e row by row at ``384 + 16 i + e``; reads its rotation R at ``528 + 16 i + e`` and
-    the moment of its higher modes at ``16 c + e`` [J]. ``k (480,)``: constants of the boxes by ``spread_shape``.
+    Args:
+        k: Constants, shape (480,): entry i of box e at ``16 i + e``; the first nine are volume times elasticity [J].
+        w: Workspace (672,): F, then P, of box e row by row at ``384 + 16 i + e``; reads its rotation R at ``528 + 16 i
+            + e`` and the moment of its higher modes at ``16 c + e`` [J].
     """
     for lane in range(LANES):
         r, higher = nine(w, ROTATION + lane), three(w, lane)
@@ -203,9 +221,12 @@ def write_stress(k, w):
 
 @njit(**LANE_OPTIONS)
 def write_linear_forces(k, w):
-    """Write the forces [N] on constant and linear modes of sixteen boxes; ``k (480,)``: constants by ``spread_shape``.
+    """Write the forces [N] on constant and linear modes of sixteen boxes to the workspace.
 
-    ``w (672,)``: reads stress P at ``384 + 16 i + e`` [J], writes modes p = 0 (zero), 1, 2, 4 to ``16 (3 p + c) + e``.
+    Args:
+        k: Constants, shape (480,): entry i of box e at ``16 i + e``; the last three are -1 / (4 h) in x, y, z [1/m].
+        w: Workspace (672,): reads stress P at ``384 + 16 i + e`` [J], writes modes p = 0 (zero), 1, 2, 4 to ``16 (3 p +
+            c) + e``.
     """
     for lane in range(LANES):
         p, scale = nine(w, DEFORMATION + lane), three(k, SCALE + lane)
@@ -231,10 +252,15 @@ def turn_higher(w):
 
 @njit(cache=True)
 def replace_by_forces(k, w):
-    """Replace the modes [m] of sixteen boxes by the forces on them [N]; ``k (480,)``: constants by ``spread_shape``.
+    """Replace the modes [m] of sixteen boxes by the forces on them [N].
 
-    ``w (672,)``: mode p of box e, then its force, at ``16 (3 p + c) + e``; reads rotation R at ``528 + 16 i + e`` and F
-    at ``384 + 16 i + e`` (overwritten). The loops are short and unrolled: only then does the compiler vectorise them.
+    The loops are short and unrolled: only then does the compiler vectorise them.
+
+    Args:
+        k: Constants, shape (480,): entry i of box e at ``16 i + e``; 27 elastic ones [J, N/m], then -1 / (4 h) in x, y,
+            z [1/m].
+        w: Workspace (672,): mode p of box e, then its force, at ``16 (3 p + c) + e``; reads rotation R at ``528 + 16 i
+            + e`` and F at ``384 + 16 i + e`` (overwritten).
     """
     resist(k, w)
     write_stress(k, w)
@@ -244,16 +270,24 @@ def replace_by_forces(k, w):
 
 @njit(**LANE_OPTIONS)
 def own_constants(k, lane):
-    """Return the 27 constants [J, N/m] of box ``lane`` (0 to 15), scalars ``k[16 i + lane]``; ``k``: shape (480,)."""
+    """Return the 27 constants of one box: volume times elasticity, 9 scalars [J], stiffness of higher modes, 18 [N/m].
+
+    Args:
+        k: Constants of sixteen boxes, shape (480,): entry i of box e at ``16 i + e``.
+        lane: Number of the box, 0 to 15.
+    """
     return nine(k, lane) + nine(k, 9 * LANES + lane) + nine(k, 18 * LANES + lane)
 
 
 @njit(cache=True)
 def spread_shape(constants, scale, k):
-    """Copy the constants of one shape to sixteen boxes, entry i of box e at ``k[16 i + e]``, shape (480,).
+    """Copy the constants of one shape to sixteen boxes.
 
-    ``constants (27,)`` of ``force_corotational.box_constants`` [J, N/m] come first, then ``scale (3,)``, the values
-    -1 / (4 h) along each direction [1/m] with the edge lengths h.
+    Args:
+        constants: Volume times elasticity, 9 entries [J], then stiffness of the higher modes, 18 entries [N/m]; shape
+            (27,).
+        scale: -1 / (4 h) along x, y, z with the edge lengths h, shape (3,) [1/m].
+        k: Written: entry i of box e at ``16 i + e``, first ``constants``, then ``scale``; shape (480,).
     """
     for i in range(27):
         k[LANES * i : LANES * (i + 1)] = constants[i]
@@ -263,10 +297,14 @@ def spread_shape(constants, scale, k):
 
 @njit(cache=True)
 def box_energies(w, lane, k):
-    """Return the energies of the mean strain and of the higher modes of box ``lane`` (0 to 15), two scalars [J].
+    """Return the energies of the mean strain and of the higher modes of one box, two scalars [J].
 
-    ``w (672,)``: component c of mode p at ``16 (3 p + c) + lane`` [m], deformation gradient F at ``384 + 16 i + lane``,
-    rotation R at ``528 + 16 i + lane``; ``k``: 27 constants of the box, scalars of ``own_constants``.
+    Args:
+        w: Workspace (672,): component c of mode p at ``16 (3 p + c) + lane`` [m], deformation gradient F at ``384 + 16
+            i + lane``, rotation R at ``528 + 16 i + lane``.
+        lane: Number of the box in the workspace, 0 to 15.
+        k: Constants of the box: volume times elasticity, 9 scalars [J], stiffness of the higher modes, 18 scalars
+            [N/m].
     """
     higher, r = 0.0, nine(w, ROTATION + lane)
     u, back = stretch(r, nine(w, DEFORMATION + lane)), transposed(r)
@@ -283,7 +321,12 @@ def box_energies(w, lane, k):
 
 @njit(cache=True)
 def repeat_last(w, count):
-    """Copy all modes of box ``count - 1`` (slots s < 24: ``w[16 s + count - 1]``) to the following boxes of sixteen."""
+    """Copy the modes of the last of ``count`` boxes to the following boxes of a workspace of sixteen.
+
+    Args:
+        w: Workspace (>= 384,), changed in place: component c of mode p of box e at ``16 (3 p + c) + e`` [m].
+        count: Number of boxes, integer; from 16 on nothing is copied.
+    """
     for slot in range(0, DEFORMATION, LANES):
         for lane in range(count, LANES):
             w[slot + lane] = w[slot + count - 1]
@@ -295,8 +338,8 @@ def add_turned_row_forces(rows, scales, constants, displacement, force):
 
     Args:
         rows: Positions where the four lines of a row begin, number of boxes, shape index; shape (nr, 6) int32.
-        scales: -1 / (4 h) of each shape along each direction, h edge lengths, shape (ns, 3) [1/m].
-        constants: Constants of each shape, see ``force_corotational.box_constants``, shape (ns, 27) [J, N/m].
+        scales: -1 / (4 h) of each shape along x, y, z with the edge lengths h, shape (ns, 3) [1/m].
+        constants: Volume times elasticity [J] and stiffness of higher modes [N/m] of each shape, shape (ns, 27).
         displacement: Displacement at the positions of the lines, shape (3, >= p + PAD) [m].
         force: Force at the positions, shape (3, >= p + PAD) [N], added to.
 
@@ -328,8 +371,11 @@ def add_turned_row_forces(rows, scales, constants, displacement, force):
 def row_energies(rows, scales, constants, displacement):
     """Return the total energies of mean strains and of higher modes of rows of boxes, two scalars [J].
 
-    ``rows (nr, 6)``: positions where four lines begin, number of boxes, shape; ``scales (ns, 3)``: -1 / (4 h) [1/m];
-    ``constants (ns, 27)``: of ``box_constants``; ``displacement (3, >= p + PAD)``: component by position in lines [m].
+    Args:
+        rows: Positions where the four lines of a row begin, number of boxes, shape index; shape (nr, 6) int32.
+        scales: -1 / (4 h) of each shape along x, y, z with the edge lengths h, shape (ns, 3) [1/m].
+        constants: Volume times elasticity [J] and stiffness of higher modes [N/m] of each shape, shape (ns, 27).
+        displacement: Displacement at the positions of the lines, shape (3, >= p + PAD) [m].
     """
     faces, w, k = np.zeros((3, 4, WIDTH)), np.zeros(TURNED_SLOTS), np.empty(SCALE + 3 * LANES)
     mean = higher = 0.0

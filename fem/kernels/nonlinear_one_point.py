@@ -54,13 +54,18 @@ PLASTIC, STRETCH, STATE_SLOTS = 6 * WIDTH, 7 * WIDTH, 13 * WIDTH  # of the state
 
 
 class OnePointBlocks(NamedTuple):
-    """One-point hexahedra in blocks of ``WIDTH`` lanes; blocks of equal shapes share a pattern.
+    """One-point hexahedra in nb blocks of ``WIDTH`` lanes; blocks of equal shapes share one of np patterns.
 
     Attributes:
-        cells, filled, pattern, material, elastic, plastic: As in ``kernels.nonlinear_gradient.Blocks``.
+        cells: Nodes of each block in tensor order, ``(nb, 8, WIDTH)`` int32; lanes past the last element repeat it.
+        filled: ``(nb,)`` int32 elements of each block.
+        pattern: ``(nb,)`` int32 index into ``constants`` and ``weight``.
+        material: ``(nb,)`` int32, one material a block.
+        elastic: ``(nm, 9)`` [Pa] C_xx, C_yy, C_zz, C_xy, C_yz, C_xz, G_xy, G_yz, G_xz.
+        plastic: ``(nm, 6)``, see ``materials.plasticity.plastic_constants``.
         constants: ``(np, WIDTH * 120)``, of each lane those of ``kernels.turned_hexahedron``.
         weight: ``(np, 1, WIDTH)`` [m^3] volume.
-        state: ``(nb, 1, WIDTH * 13)``, see ``kernels.nonlinear``.
+        state: ``(nb, 1, WIDTH * 13)``: stress [Pa], plastic strain, stretch; entry i of element e at ``WIDTH i + e``.
         plastic_work: ``(nb, WIDTH)`` [J].
         hourglass_energy: ``(nb, WIDTH)`` [J].
         slip: ``(nb, WIDTH * 12)`` [m] plastic part of the amplitudes.
@@ -95,30 +100,39 @@ def carried(strength, mises):
 
 @njit(**VECTOR_OPTIONS)
 def section_limit(strength, mises):
-    """Return the largest hourglass stress next to an axial stress, as ``carried``; all are vectors [Pa]."""
+    """Return the largest hourglass stress that a section carries next to its axial stress, a SIMD vector [Pa].
+
+    Args:
+        strength: Yield stress, positive SIMD vector of ``WIDTH`` lanes [Pa].
+        mises: Von Mises stress at the centre, SIMD vector [Pa].
+    """
     ratio = mises / strength
     return BENDING_STRENGTH * strength * larger(1.0 - ratio * ratio, broadcast(LEAST_STRENGTH))
 
 
 @njit(**VECTOR_OPTIONS)
 def small_strain(h):
-    """Return the strain xx, yy, zz, xy, yz, xz (engineering shear) of a displacement gradient, nine vectors."""
+    """Return the strain of a displacement gradient, six SIMD vectors xx, yy, zz, xy, yz, xz with engineering shear.
+
+    Args:
+        h: Displacement gradient F - 1, nine SIMD vectors of ``WIDTH`` lanes, row by row.
+    """
     return h[0], h[4], h[8], h[1] + h[3], h[5] + h[7], h[2] + h[6]
 
 
 @njit(**VECTOR_OPTIONS)
 def change_of(new, old):
-    """Return the difference of six vectors."""
+    """Return new - old, six SIMD vectors; both arguments are tuples of six SIMD vectors of ``WIDTH`` lanes."""
     return new[0] - old[0], new[1] - old[1], new[2] - old[2], new[3] - old[3], new[4] - old[4], new[5] - old[5]
 
 
 @njit(**VECTOR_OPTIONS)
 def stretch_increment(new, old):
-    """Return the strain increment sym((U_1 - U_0) ((U_0 + U_1) / 2)^-1), six vectors with engineering shear.
+    """Return the strain increment sym((U_1 - U_0) ((U_0 + U_1) / 2)^-1), six SIMD vectors with engineering shear.
 
     Args:
-        new: Stretch U_1 after the step, six vectors xx, yy, zz, xy, yz, xz.
-        old: Stretch U_0 before it, six vectors.
+        new: Stretch U_1 after the step, six SIMD vectors xx, yy, zz, xy, yz, xz.
+        old: Stretch U_0 before it, six SIMD vectors in this order.
     """
     d = change_of(new, old)
     m = (
@@ -132,7 +146,12 @@ def stretch_increment(new, old):
 
 @njit(**VECTOR_OPTIONS)
 def elasticity_at(elastic, material):
-    """Return the nine constants [Pa] of a material; ``elastic`` is a pointer to those of all materials."""
+    """Return C_xx, C_yy, C_zz, C_xy, C_yz, C_xz, G_xy, G_yz, G_xz of a material, nine scalars [Pa].
+
+    Args:
+        elastic: Pointer to the constants of all materials, nine each [Pa].
+        material: Index of the material, integer.
+    """
     k = 9 * material
     return (
         elastic[k], elastic[k + 1], elastic[k + 2], elastic[k + 3], elastic[k + 4],
@@ -142,23 +161,28 @@ def elasticity_at(elastic, material):
 
 @njit(**VECTOR_OPTIONS)
 def mises_of(s):
-    """Return the von Mises stress of a stress of six vectors, a vector [Pa]."""
+    """Return the von Mises stress, a SIMD vector of ``WIDTH`` lanes [Pa].
+
+    Args:
+        s: Stress, six SIMD vectors xx, yy, zz, xy, yz, xz [Pa].
+    """
     x, y, z = s[0] - s[1], s[1] - s[2], s[2] - s[0]
     return root(0.5 * (x * x + y * y + z * z) + 3.0 * (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]))
 
 
 @njit(**VECTOR_OPTIONS)
 def move_centre(state, d, elastic, law):
-    """Advance the stress at the centres by a step, and store it.
+    """Advance stress and plastic strain at the centres by a step, and store them in the state.
 
     Args:
-        state: Pointer to the state, and position of the block in it.
-        d: Strain increment, six vectors with engineering shear.
+        state: Pointer to the state, updated (stress [Pa] and plastic strain), and position of the block in it.
+        d: Strain increment, six SIMD vectors xx, yy, zz, xy, yz, xz with engineering shear.
         elastic: Orthotropic elasticity, nine scalars [Pa].
-        law: Constants of ``vectors.plastic.law_at``.
+        law: Constants of ``law_at``, six scalars: 3 G, first yield stress, B [Pa], n, C, reference increment.
 
     Returns:
-        Stress, six vectors [Pa], its von Mises stress [Pa], plastic strain and plastic work density [J/m^3].
+        Stress, six SIMD vectors [Pa]; von Mises stress [Pa], plastic strain and plastic work density [J/m^3], SIMD
+        vectors.
     """
     values, at = state
     s, strain, density = add_elastic(six(values, at), d, elastic), load(values, at + PLASTIC), broadcast(0.0)
@@ -175,12 +199,12 @@ def move_centre(state, d, elastic, law):
 
 @njit(**VECTOR_OPTIONS)
 def slip_factor(trial, centre, law):
-    """Return the factor that reduces hourglass forces to the limit of a section, a vector, 1 below the limit.
+    """Return the factor that reduces hourglass forces to the limit of a section, a SIMD vector, 1 below the limit.
 
     Args:
-        trial: Hourglass stress before the reduction, a vector [Pa].
-        centre: Von Mises stress [Pa] and plastic strain of the centre, two vectors.
-        law: Constants of ``vectors.plastic.law_at``.
+        trial: Hourglass stress before the reduction, SIMD vector [Pa].
+        centre: Von Mises stress [Pa] and plastic strain of the centre, a tuple of two SIMD vectors.
+        law: Constants of ``law_at``, six scalars: 3 G, first yield stress, B [Pa], n, C, reference increment.
     """
     mises, strain = centre
     one, first = broadcast(1.0), section_limit(broadcast(law[1]), mises)  # the yield stress is at least the first one
@@ -190,7 +214,12 @@ def slip_factor(trial, centre, law):
 
 @njit(**VECTOR_OPTIONS)
 def read_four(values, at):
-    """Return four tuples of three vectors; ``values`` is a pointer, ``at`` the first position."""
+    """Return four tuples of three SIMD vectors each, which follow each other in memory.
+
+    Args:
+        values: Pointer to an array of doubles.
+        at: Position of the first double, integer.
+    """
     return (
         three(values, at),
         three(values, at + 3 * WIDTH),
@@ -201,34 +230,35 @@ def read_four(values, at):
 
 @njit(**VECTOR_OPTIONS)
 def four_minus(a, b):
-    """Return a - b; both are four tuples of three vectors."""
+    """Return a - b; both are four tuples (x, y, z) of three SIMD vectors each, and so is the result."""
     return minus(a[0], b[0]), minus(a[1], b[1]), minus(a[2], b[2]), minus(a[3], b[3])
 
 
 @njit(**VECTOR_OPTIONS)
 def four_scaled(factor, a):
-    """Return a vector times four tuples of three vectors."""
+    """Return ``factor``, one SIMD vector, times ``a``, four tuples (x, y, z) of three SIMD vectors each."""
     return scaled(factor, a[0]), scaled(factor, a[1]), scaled(factor, a[2]), scaled(factor, a[3])
 
 
 @njit(**VECTOR_OPTIONS)
 def half_product(a, f):
-    """Return a . f / 2, a vector; both are four tuples of three vectors."""
+    """Return a . f / 2, one SIMD vector; both arguments are four tuples (x, y, z) of three SIMD vectors each."""
     return 0.5 * (dot(a[0], f[0]) + dot(a[1], f[1]) + dot(a[2], f[2]) + dot(a[3], f[3]))
 
 
 @njit(**VECTOR_OPTIONS)
 def move_hourglass(parts, b, elastic, f, trial):
-    """Return hourglass forces within the limit of a section, four tuples [N]; the excess becomes slip.
+    """Return hourglass forces within the limit of a section, four tuples of three SIMD vectors [N].
 
-    Plastic work is the slip times the mean force of the step, without the rotation of the force within it.
+    The excess becomes slip. Plastic work is the slip times the mean force of the step, without the rotation of the
+    force within it.
 
     Args:
-        parts: Pointers to slip [m], hourglass energy [J] and plastic work [J], which are updated.
-        b: Number of the block.
-        elastic: Elastic amplitudes g^ - slip, four tuples [m].
-        f: Hourglass forces H (g^ - slip), four tuples [N].
-        trial: Factor of ``slip_factor`` and hourglass energy before the reduction [J], two vectors.
+        parts: Pointers to slip [m], hourglass energy [J] and plastic work [J] of all blocks, which are updated.
+        b: Number of the block, integer.
+        elastic: Elastic amplitudes g^ - slip, four tuples (x, y, z) of three SIMD vectors [m].
+        f: Hourglass forces H (g^ - slip), four tuples (x, y, z) of three SIMD vectors [N].
+        trial: Factor of ``slip_factor`` (0 to 1) and hourglass energy before the reduction [J], two SIMD vectors.
     """
     slips, energies, works = parts
     factor, energy = trial
@@ -246,14 +276,14 @@ def move_hourglass(parts, b, elastic, f, trial):
 
 @njit(**VECTOR_OPTIONS)
 def nominal_stress(r, u, s, volume, moment):
-    """Return P, the nominal stress times volume (derivative of the energy by F), nine vectors row by row [J].
+    """Return P, the nominal stress times volume (derivative of the energy by F), nine SIMD vectors row by row [J].
 
     Args:
-        r: Rotation R, nine vectors row by row.
-        u: Stretch U, six vectors.
-        s: Stress, six vectors [Pa].
-        volume: Initial volume, a vector [m^3].
-        moment: Moment of the hourglass forces, three vectors [J].
+        r: Rotation R, nine SIMD vectors of ``WIDTH`` lanes, row by row.
+        u: Stretch U, six SIMD vectors xx, yy, zz, xy, yz, xz.
+        s: Stress in the rotated frame, six SIMD vectors in this order [Pa].
+        volume: Initial volume, SIMD vector [m^3].
+        moment: Moment of the hourglass forces, tuple (x, y, z) of three SIMD vectors [J].
     """
     c = cofactor_symmetric(u)
     v = volume / (u[0] * c[0] + u[3] * c[3] + u[5] * c[5])
@@ -264,25 +294,34 @@ def nominal_stress(r, u, s, volume, moment):
 
 @njit(**VECTOR_OPTIONS)
 def small_nominal_stress(s, volume):
-    """Return the stress (six vectors [Pa]) times the volume (a vector [m^3]), nine vectors row by row [J]."""
+    """Return the stress times the volume, nine SIMD vectors row by row [J].
+
+    Args:
+        s: Stress, six SIMD vectors xx, yy, zz, xy, yz, xz [Pa].
+        volume: Volume, SIMD vector of ``WIDTH`` lanes [m^3].
+    """
     return full((volume * s[0], volume * s[1], volume * s[2], volume * s[3], volume * s[4], volume * s[5]))
 
 
 @njit(**VECTOR_OPTIONS)
 def no_rotation():
-    """Return the identity, nine vectors row by row."""
+    """Return the identity matrix, nine SIMD vectors of ``WIDTH`` lanes, row by row."""
     one, none = broadcast(1.0), broadcast(0.0)
     return one, none, none, none, one, none, none, none, one
 
 
 @njit(**VECTOR_OPTIONS)
 def deform(h, old, finite):
-    """Return rotation R (nine vectors), new stretch or small strain, strain increment (six each), and det F > 0.
+    """Return rotation, stretch and strain increment of a step at the centres of elements.
 
     Args:
-        h: Mean displacement gradient F - 1, nine vectors row by row.
-        old: Stretch or small strain before the step, six vectors.
-        finite: Whether rotations and strains are finite.
+        h: Mean displacement gradient F - 1 after the step, nine SIMD vectors of ``WIDTH`` lanes, row by row.
+        old: Stretch (``finite``) or small strain before the step, six SIMD vectors xx, yy, zz, xy, yz, xz.
+        finite: Whether rotations and strains are finite, boolean.
+
+    Returns:
+        Rotation R, nine SIMD vectors; new stretch or small strain, six; strain increment with engineering shear, six;
+        and whether det F > 0 in all lanes (always True with small strains).
     """
     if finite:
         r, e, upright = polar(deformation_gradient(h))
@@ -297,7 +336,7 @@ def add_one_point_force(blocks, path, displacement, force):
     """Subtract the internal force of one-point hexahedra, and advance their state by a step.
 
     Args:
-        blocks: ``OnePointBlocks``; state, slip, energies and work are updated.
+        blocks: ``OnePointBlocks``, the elements in blocks; state, slip, energies and work are updated.
         path: ``Path``: small or finite kinematics, and the time step of rate-dependent laws [s].
         displacement: Nodal displacement after the step, shape (n, 3) [m].
         force: Nodal force, shape (n, 3) [N], subtracted from.

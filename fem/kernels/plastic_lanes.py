@@ -14,7 +14,12 @@ FLOW = NOMINAL  # slot of the workspace where ``kernels.nonlinear`` has the nomi
 
 @njit(**VECTOR_OPTIONS)
 def six_apart(values, at):
-    """Return six vectors, one of each slot of sixteen lanes; ``values`` is a pointer, ``at`` the first position."""
+    """Return six SIMD vectors of ``WIDTH`` lanes, each from one of six successive slots of sixteen doubles.
+
+    Args:
+        values: Pointer to an array of doubles.
+        at: Position of the first lane in the first slot, integer; the same lanes of the next slot are 16 doubles later.
+    """
     return (
         load(values, at), load(values, at + LANES), load(values, at + 2 * LANES),
         load(values, at + 3 * LANES), load(values, at + 4 * LANES), load(values, at + 5 * LANES),
@@ -23,7 +28,13 @@ def six_apart(values, at):
 
 @njit(**VECTOR_OPTIONS)
 def put_six_apart(values, at, vectors):
-    """Write six vectors, one to each slot of sixteen lanes; ``values`` is a pointer, ``at`` the first position."""
+    """Write six SIMD vectors of ``WIDTH`` lanes, each to one of six successive slots of sixteen doubles.
+
+    Args:
+        values: Pointer to an array of doubles, overwritten there.
+        at: Position of the first lane in the first slot, integer; the same lanes of the next slot are 16 doubles later.
+        vectors: Tuple of six SIMD vectors.
+    """
     store(values, at, vectors[0])
     store(values, at + LANES, vectors[1])
     store(values, at + 2 * LANES, vectors[2])
@@ -34,12 +45,16 @@ def put_six_apart(values, at, vectors):
 
 @njit(**LANE_OPTIONS)
 def law_of(plastic, material, step):
-    """Return the constants of the plastic law of a material for steps of a length, see ``vectors.plastic.law_at``.
+    """Return the constants of the plastic law of a material for steps of a length, six scalars.
 
     Args:
-        plastic: Plastic constants of the materials, shape (nm, 6), see ``materials.plasticity.plastic_constants``.
+        plastic: 3 G, A, B [Pa], n, C and reference rate [1/s] of each material (Johnson and Cook), shape (nm, 6).
         material: Index of the material, integer.
-        step: Time step dt, scalar [s].
+        step: Time step dt, scalar [s]; infinity means quasi-static.
+
+    Returns:
+        3 G [Pa], first yield stress [Pa], hardening modulus [Pa], exponent, rate sensitivity (0 where the rate does not
+        count), and the increment of the plastic strain at the reference rate (then 1).
     """
     return law_at(place(plastic), material, step)
 
@@ -49,13 +64,13 @@ def plastic_flow(w, state, g, law):
     """Return the stress of sixteen elements at one point to the yield surface where the trial state lies outside.
 
     Args:
-        w: Flat workspace, shape (544,), with six strain increments at ``INCREMENT`` and the trial von Mises stress at
-            ``MISES`` [Pa], which becomes the one after the step; plastic work densities [J/m^3] are written at
-            ``FLOW``.
+        w: Flat workspace, shape (544,), with six strain increments (engineering shear) from ``INCREMENT`` on and the
+            trial von Mises stress at ``MISES`` [Pa], which becomes the one after the step; plastic work densities
+            [J/m^3] are written at ``FLOW``. Each is a slot of sixteen elements.
         state: State of all points, entry k of element e in column ``16 * k + e``, shape (points, >= 112): six elastic
             trial stresses [Pa] and the plastic strain; both are updated at the point (radial return).
         g: Number of the point, row of ``state``, integer.
-        law: Constants of ``law_of``, six scalars.
+        law: Constants of ``law_of``, six scalars: 3 G, first yield stress, B [Pa], n, C, reference increment.
 
     Returns:
         Whether any of the elements yields; then ``add_work`` can follow.

@@ -42,7 +42,13 @@ TRIPLE = 3 * WIDTH
 
 @njit(**VECTOR_OPTIONS)
 def add_product(f, a, b):
-    """Return f + a (x) b; f has nine vectors row by row, a and b have three."""
+    """Return f + a (x) b, with the outer product of ``a`` and ``b``, nine SIMD vectors row by row.
+
+    Args:
+        f: Matrix, nine SIMD vectors of ``WIDTH`` lanes, row by row.
+        a: Tuple (x, y, z) of three SIMD vectors, whose component is the row.
+        b: Tuple (x, y, z) of three SIMD vectors, whose component is the column.
+    """
     return (
         f[0] + a[0] * b[0], f[1] + a[0] * b[1], f[2] + a[0] * b[2],
         f[3] + a[1] * b[0], f[4] + a[1] * b[1], f[5] + a[1] * b[2],
@@ -52,18 +58,24 @@ def add_product(f, a, b):
 
 @njit(**VECTOR_OPTIONS)
 def less_product(f, a, b):
-    """Return f - a (x) b; f has nine vectors row by row, a and b have three."""
+    """Return f - a (x) b, with the outer product of ``a`` and ``b``, nine SIMD vectors row by row.
+
+    Args:
+        f: Matrix, nine SIMD vectors of ``WIDTH`` lanes, row by row.
+        a: Tuple (x, y, z) of three SIMD vectors, whose component is the row.
+        b: Tuple (x, y, z) of three SIMD vectors, whose component is the column.
+    """
     return add_product(f, (-a[0], -a[1], -a[2]), b)
 
 
 @njit(**VECTOR_OPTIONS)
 def displacement_gradient(k, at, q):
-    """Return the mean displacement gradient F - 1 of hexahedra, nine vectors row by row.
+    """Return the mean displacement gradient F - 1 of hexahedra, nine SIMD vectors of ``WIDTH`` lanes, row by row.
 
     Args:
-        k: Pointer to the constants.
-        at: Position of the constants of the pattern.
-        q: Modes, eight tuples (x, y, z) [m].
+        k: Pointer to the constants of all patterns, float64.
+        at: Position of the constants of the pattern behind ``k``, integer.
+        q: Displacement modes of the eight nodes, eight tuples (x, y, z) of three SIMD vectors [m].
     """
     at, none = at + GRADIENT, broadcast(0.0)
     h = add_product((none, none, none, none, none, none, none, none, none), q[1], three(k, at))
@@ -77,20 +89,23 @@ def displacement_gradient(k, at, q):
 
 @njit(**VECTOR_OPTIONS)
 def deformation_gradient(h):
-    """Return F from F - 1; both are nine vectors row by row."""
+    """Return F from ``h``, the displacement gradient F - 1; both are nine SIMD vectors row by row."""
     return h[0] + 1.0, h[1], h[2], h[3], h[4] + 1.0, h[5], h[6], h[7], h[8] + 1.0
 
 
 @njit(**VECTOR_OPTIONS)
 def amplitudes(k, at, q, h, r):
-    """Return the hourglass amplitudes g^ = R^T (q - (F - 1) c) of the modes xy, xz, yz, xyz, four tuples [m].
+    """Return the hourglass amplitudes g^ = R^T (q - (F - 1) c) of the modes xy, xz, yz, xyz [m].
 
     Args:
-        k: Pointer to the constants.
-        at: Position of the constants of the pattern.
-        q: Modes, eight tuples (x, y, z) [m].
-        h: Mean displacement gradient F - 1, nine vectors row by row.
-        r: Rotation R, nine vectors row by row.
+        k: Pointer to the constants of all patterns, float64.
+        at: Position of the constants of the pattern behind ``k``, integer.
+        q: Displacement modes of the eight nodes, eight tuples (x, y, z) of three SIMD vectors [m].
+        h: Mean displacement gradient F - 1, nine SIMD vectors row by row.
+        r: Rotation R, nine SIMD vectors row by row.
+
+    Returns:
+        Four tuples (x, y, z) of three SIMD vectors of ``WIDTH`` lanes.
     """
     at, back = at + CORNERS, transposed(r)
     return (
@@ -103,12 +118,12 @@ def amplitudes(k, at, q, h, r):
 
 @njit(**VECTOR_OPTIONS)
 def resistance(k, at, g):
-    """Return the hourglass forces H g^ of the modes xy, xz, yz, xyz, four tuples [N].
+    """Return the hourglass forces H g^ of the modes xy, xz, yz, xyz, four tuples of three SIMD vectors [N].
 
     Args:
-        k: Pointer to the constants; off-diagonal blocks are stored once and act twice.
-        at: Position of the constants of the pattern.
-        g: Amplitudes g^, four tuples [m].
+        k: Pointer to the constants of all patterns, float64; off-diagonal blocks are stored once and act twice.
+        at: Position of the constants of the pattern behind ``k``, integer.
+        g: Amplitudes g^, four tuples (x, y, z) of three SIMD vectors [m].
     """
     a, b, c, d = g
     at = at + STIFFNESS
@@ -130,7 +145,12 @@ def resistance(k, at, g):
 
 @njit(**VECTOR_OPTIONS)
 def moment_of(g, f):
-    """Return the moment sum of g^ x H g^, three vectors [J]; ``g`` and ``f`` are four tuples each, [m] and [N]."""
+    """Return the moment of hourglass forces, the sum of g^ x H g^, a tuple (x, y, z) of three SIMD vectors [J].
+
+    Args:
+        g: Amplitudes g^ of the modes xy, xz, yz, xyz, four tuples (x, y, z) of three SIMD vectors [m].
+        f: Forces H g^ on these modes, four tuples (x, y, z) of three SIMD vectors [N].
+    """
     none = broadcast(0.0)
     moment = add_cross(add_cross((none, none, none), g[0], f[0]), g[1], f[1])
     return add_cross(add_cross(moment, g[2], f[2]), g[3], f[3])
@@ -138,14 +158,14 @@ def moment_of(g, f):
 
 @njit(**VECTOR_OPTIONS)
 def forces_on_modes(k, at, r, p, f):
-    """Return the forces on the modes of hexahedra, eight tuples (x, y, z) [N].
+    """Return the forces on the modes 1, x, y, xy, z, xz, yz, xyz of hexahedra, eight tuples of three SIMD vectors [N].
 
     Args:
-        k: Pointer to the constants.
-        at: Position of the constants of the pattern.
-        r: Rotation R, nine vectors row by row.
-        p: P, the derivative of the energy by F, nine vectors row by row [J].
-        f: Hourglass forces in the rotated frame, four tuples [N].
+        k: Pointer to the constants of all patterns, float64.
+        at: Position of the constants of the pattern behind ``k``, integer.
+        r: Rotation R, nine SIMD vectors of ``WIDTH`` lanes, row by row.
+        p: P, the derivative of the energy by F, nine SIMD vectors row by row [J].
+        f: Hourglass forces in the rotated frame, four tuples (x, y, z) of three SIMD vectors [N].
     """
     none, corners, at = broadcast(0.0), at + CORNERS, at + GRADIENT
     a, b, c, d = applied(r, f[0]), applied(r, f[1]), applied(r, f[2]), applied(r, f[3])
@@ -170,7 +190,7 @@ def add_turned_forces(blocks, displacement, force):
     Args:
         blocks: Four arrays: nodes of blocks in tensor order, where elements after the last one repeat it, (nb, 8,
             WIDTH) int32; number of elements of each block, (nb,) int32; its pattern, (nb,) int32; constants of each
-            pattern, (np, 120 WIDTH).
+            pattern [J, 1/m, m, N/m], (np, 120 WIDTH).
         displacement: Nodal displacement, shape (n, 3) [m].
         force: Nodal force, shape (n, 3) [N], subtracted from.
 
@@ -199,7 +219,10 @@ def add_turned_forces(blocks, displacement, force):
 def turned_energies(blocks, displacement):
     """Return the total energies of mean strains and of hourglass modes, two scalars [J].
 
-    Arguments as in ``add_turned_forces``.
+    Args:
+        blocks: Four arrays: nodes of blocks in tensor order, (nb, 8, WIDTH) int32; number of elements of each block,
+            (nb,) int32; its pattern, (nb,) int32; constants of each pattern [J, 1/m, m, N/m], (np, 120 WIDTH).
+        displacement: Nodal displacement, shape (n, 3) [m].
     """
     cells, filled, pattern, constants = blocks
     nodes, k, u = place(cells), place(constants), place(displacement)

@@ -1,1 +1,1 @@
-"""Kernels on vectors of ``WIDTH`` elements as values; start with ``vector``, then ``memory`` and ``modes``."""
+"""Kernels that treat SIMD vectors of ``WIDTH`` lanes as values; read ``vector`` first, then ``memory``, ``modes``."""
