@@ -1,11 +1,12 @@
-"""Cost of a window of jedec_bga in updates of linear boxes, and what its time is spent on.
+"""Cost of a window of jedec_bga in updates of linear boxes, and its parts.
 
     PYTHONPATH=. python benchmarks/window_cost.py  (five minutes, one core; writes results/window_cost.json)
 
-The window is that of the case, with one fine joint, two models on one rank, 0.66 ms into the drop, when solder flows.
-Windows and the cube of linear boxes of ``nonlinear.py forces`` take turns in one process, since other programs slow
-both down. Shares are processor seconds over those of the same number of linear updates. Force terms are left out of the
-meso model one by one, so that the others compete for the cache as they do in a window.
+A window is the time interval between two exchanges of the macro and the meso model. Here it is that of the case, with
+one fine joint, two models on one rank, 0.66 ms into the drop, when solder flows. Windows and the cube of linear boxes
+of ``nonlinear.py forces`` take turns in one process, since other programs slow both down. Shares are processor seconds
+over those of the same number of linear updates. Force terms are left out of the meso model one by one, so that the
+others compete for the cache as they do in a window.
 """
 
 import os
@@ -39,7 +40,7 @@ LEFT_OUT = {  # entries of ``ForceArrays``
 
 
 def drop() -> ProgramRun:
-    """Return the models of the case at the start of the measurement."""
+    """Build the coupled models of the case, run them until the measurement starts (0.66 ms), and return the run."""
     with tempfile.TemporaryDirectory() as folder:
         scene = DropScene.write(Path(folder), (SCALED,), "jedec_bga")
         scene = replace(scene, case=decided(scene.case))
@@ -50,14 +51,26 @@ def drop() -> ProgramRun:
 
 
 def without(steps: CompiledSteps, names: tuple[str, ...]) -> CompiledSteps:
-    """Return compiled steps without some entries of their force arrays."""
+    """Return compiled steps without some force terms; all other terms act in each step.
+
+    Args:
+        steps: Compiled steps of a model whose terms all act in each step; not changed.
+        names: Terms to leave out, entries of ``ForceArrays`` such as ``turning_boxes``; absent ones are ignored.
+    """
     kept = {name: term.arrays[name] for name, term in steps.terms[0].items() if name not in names}
     arrays = (NOTHING._replace(**kept), *[NOTHING] * (PACES - 1))
     return replace(steps, forces=paced_forces_of(tuple(map(forces_of, arrays)), np.array([1, *[0] * (PACES - 1)])))
 
 
 def seconds_of_parts(run: ProgramRun) -> dict[str, float]:
-    """Return the processor seconds of the parts of one window, which is taken."""
+    """Take one window (interval between two exchanges of the models), and return the processor time of each part [s].
+
+    Args:
+        run: Coupled run, advanced by a window.
+
+    Returns:
+        Seconds by part: ``macro: nodes``, ``meso``, ``macro: forces`` and ``macro: interface``.
+    """
     macro, meso = run.participants["macro"], run.participants["meso"]
     seconds, last = {}, process_time()
     parts = {
@@ -73,7 +86,15 @@ def seconds_of_parts(run: ProgramRun) -> dict[str, float]:
 
 
 def seconds_without(run: ProgramRun, sides: Mapping[str, CompiledSteps]) -> dict[str, float]:
-    """Return the processor seconds of a window of the meso model without some forces, each from the same state."""
+    """Return the processor time of the steps of the meso model in one window, without some forces [s].
+
+    Args:
+        run: Coupled run; the state of its meso model is restored after each measurement.
+        sides: Compiled steps by the name of the forces that they lack, each timed from the same state.
+
+    Returns:
+        Seconds by text, ``meso without NAME``; also ``meso without nothing``, the complete steps.
+    """
     motion, seconds = run.participants["meso"].motion, {}
     whole, state, now = motion._compiled, motion._state.copy(), (motion.time, motion.gravity)
     histories = [array for term in motion.body.terms for array in term.history.values()]
@@ -90,6 +111,7 @@ def seconds_without(run: ProgramRun, sides: Mapping[str, CompiledSteps]) -> dict
 
 
 def main() -> None:
+    """Measure 100 windows in turns with linear boxes, and write the medians to ``results/window_cost.json``."""
     run, mesh = drop(), cube()
     linear, elements = linear_force(elements_of(mesh)), len(mesh.cells)
     updates = run.elements["macro"] + run.plan.substeps * run.elements["meso"]

@@ -18,10 +18,12 @@ PAUSE_SHARE = 0.05  # of the time waited so far, so that a pause hardly prolongs
 
 
 def wait_for(requests: Sequence[MPI.Request]) -> None:
-    """Return when all messages have arrived; persistent requests can then be started again.
+    """Wait until all messages of this rank have arrived; the core is left to other processes meanwhile.
+
+    Persistent requests can then be started again. The function has no time limit.
 
     Args:
-        requests: Started requests; may be empty.
+        requests: Started MPI requests of this rank, completed on return; if empty, returns at once.
     """
     begin = time.perf_counter()
     while not MPI.Request.Testall(requests):
@@ -29,7 +31,10 @@ def wait_for(requests: Sequence[MPI.Request]) -> None:
 
 
 def pause(waited: float) -> None:
-    """Pause between two tests of a wait: not at all, for other processes of the core, or asleep.
+    """Pause between two tests of a wait: not at all at first, then for other processes of the core, then asleep.
+
+    The core is yielded from 0.1 ms of waiting on; from 0.2 ms on the process sleeps 5 % of the time waited, 0.05 to 2
+    ms.
 
     Args:
         waited: Time since the start of the wait [s].

@@ -14,9 +14,12 @@ JOINTS = "package.joint_numerics"
 
 
 def search_case(case: BoardDropCase) -> BoardDropCase:
-    """Return the case of a search: larger elements, all joints coarse, and no output but histories.
+    """Return the case of a search for critical joints: larger elements, all joints coarse, and no output but histories.
 
     With temperatures, the elements keep their size, because the meshes then depend on the reflow.
+
+    Args:
+        case: Case of the run, not changed.
     """
     same = {
         "shock.coupling.fine_joints": "all",
@@ -30,14 +33,29 @@ def search_case(case: BoardDropCase) -> BoardDropCase:
 
 
 def needs_search(case: BoardDropCase) -> bool:
-    """Return whether a two-scale run has critical joints, or an end, that a search must find."""
+    """Return whether a run on a coarser mesh must first find the critical joints, or the end, of a two-scale run.
+
+    The end is searched for if the duration is automatic, damping acts, and no temperatures are computed.
+
+    Args:
+        case: Case of the run.
+    """
     shock = case.shock
     finds_end = shock.duration == "auto" and decided(case).shock.damping.acts and not case.thermal
     return "two_scale" in shock.numerics.modes and (shock.coupling.fine_joints == "critical" or finds_end)
 
 
 def coarser(case: BoardDropCase, size: float) -> Values:
-    """Return the values that multiply the element size along board and package: dotted key -> value in SI units."""
+    """Return the values that multiply the element size along board and package (in plane).
+
+    Args:
+        case: Case of the run, not changed.
+        size: Element size relative to the case; above one is coarser.
+
+    Returns:
+        Dotted key of the case -> value in SI units, for ``with_values``; the layers across the thickness keep their
+        number, except those of the joints without a pad layer.
+    """
     board, package, numerics = case.board.numerics, case.package, case.package.joint_numerics
     values: Values = {
         "board.numerics.element_size": size * board.element_size,
@@ -59,7 +77,15 @@ def coarser(case: BoardDropCase, size: float) -> Values:
 
 
 def fewer_layers(case: BoardDropCase, size: float) -> Values:
-    """Return the values that multiply the element size across all layers: dotted key -> value in SI units."""
+    """Return the values that multiply the element size across all layers (through the thickness).
+
+    Args:
+        case: Case of the run, not changed.
+        size: Element size relative to the case; above one is coarser.
+
+    Returns:
+        Dotted key of the case -> number of elements, for ``with_values``.
+    """
     board, package, numerics = case.board.numerics, case.package, case.package.joint_numerics
     layers = rounded_count(board.layers, size)
     return {
@@ -74,5 +100,5 @@ def fewer_layers(case: BoardDropCase, size: float) -> Values:
 
 
 def rounded_count(elements: int, size: float) -> int:
-    """Return a number of elements divided by their relative size, rounded, at least one."""
+    """Return a number of elements divided by ``size``, their relative size, rounded; at least one."""
     return max(1, floor(elements / size + 0.5))

@@ -24,17 +24,18 @@ def find_fine_joints(run: Run[BoardDropCase], folder: Path) -> FineJoints:
     """Return the fine joints of the two-scale run; find critical ones, and the end of a damped shock, by a search.
 
     The search, in the folder ``coarse``, is a two-scale run as well, because the board then keeps its large step.
+    Without a search, the joints are those that the case names, and nothing is run or written.
 
     Args:
         run: Run folder with assembly and joints, case, cores.
         folder: Folder of the shock, into which the search and ``fine_joints.json`` are written.
 
     Returns:
-        Names of the joints with a fine mesh, or "all", the reason for the choice, and the end of the shock if the
+        Names of the joints with a fine mesh, or "all", the reason for the choice, and the end of the shock [s] if the
         search decides it.
 
     Raises:
-        LaunchError: The run failed; the message contains its last lines.
+        LaunchError: The run of the search failed; the message contains its last lines.
     """
     case, fine = run.case, named_joints(run.case.shock.coupling)
     if not needs_search(case):

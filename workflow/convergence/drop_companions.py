@@ -21,11 +21,16 @@ CHEAP = 0.3  # largest cost of one model on the coarsest mesh, over that of the 
 
 
 def drop_companions(case: BoardDropCase, shock: Path | None) -> dict[str, BoardDropCase]:
-    """Return the companions of a drop by name; none if the case estimates no errors.
+    """Return the companions of a drop, the same case on coarser meshes from whose results errors are estimated.
 
     Args:
         case: Case of the run.
-        shock: Product of its shock, which decides the fine joints and the end; None before, for the expected ones.
+        shock: Folder of the results of its shock, which decide the fine joints and the end; None before, for the
+            expected ones.
+
+    Returns:
+        Case of each companion by name, ``size_1.5``, ``size_2`` and perhaps ``half_window``; empty if the case
+        estimates no errors.
     """
     if not case.estimates_errors:
         return {}
@@ -40,10 +45,12 @@ def drop_companions(case: BoardDropCase, shock: Path | None) -> dict[str, BoardD
 def resized_drop(case: BoardDropCase, shock: Path | None, size: float) -> BoardDropCase:
     """Return a drop with elements of another size, with the fine joints and the end of the run.
 
+    The case has one rank, the first model of the run alone, and no estimate of errors.
+
     Args:
-        case: Case of the run.
-        shock: Product of its shock; None before.
-        size: Size of all elements relative to the case.
+        case: Case of the run, not changed.
+        shock: Folder of the results of its shock; None before, for the expected joints and end.
+        size: Element size relative to the case; above one is coarser.
     """
     main = _main_mode(case)
     same: Values = {
@@ -68,15 +75,21 @@ def _main_mode(case: BoardDropCase) -> str:
 
 
 def compares_models(case: BoardDropCase, end: float) -> bool:
-    """Return whether a run until its end [s] computes one model, too, for most of its time."""
+    """Return whether a two-scale run also computes one model without scales (DNS) for at least half of its time.
+
+    Args:
+        case: Case of the run.
+        end: End of the run [s].
+    """
     numerics = case.shock.numerics
     return {"two_scale", "dns"} <= set(numerics.modes) and (numerics.dns_duration or end) >= LEAST_END * end
 
 
 def drop_sizes(_case: BoardDropCase, _shock: Path) -> dict[str, float]:
-    """Return the size of the elements of each companion relative to the case, by name.
+    """Return the element size of each companion relative to the case, by name: ``{"size_1.5": 1.5, "size_2": 2.0}``.
 
-    The parts of a drop round their numbers of elements differently, up or down, so that the nominal size is taken.
+    The parts of a drop round their numbers of elements differently, up or down, so that the nominal size is taken. Both
+    arguments, the case and the folder of its shock, are not used; the sizes of a structure depend on them.
     """
     return {size_name(size): size for size in SIZES}
 

@@ -1,9 +1,10 @@
 """Stage that estimates the errors of a run from its companions: discretisation, and two scales against one model.
 
-Each figure has an observed order and the grid convergence index of ``grid_convergence.py``, in a drop at least the
-median of its family: the figures of the joint, or deflections and strains of the board. The error of two scales is
-the relative difference from one model on the same mesh, of the run or of the coarsest companion, or from half the
-coupling window. A failed companion leaves these errors unknown, with its message.
+A companion is the same case on a coarser mesh, or also with half the coupling window. Each figure has an observed order
+and the grid convergence index of ``grid_convergence.py``, in a drop at least the median of its family: the figures of
+the joint, or deflections and strains of the board. The error of two scales is the relative difference from one model on
+the same mesh, of the run or of the coarsest companion, or from half the coupling window. A failed companion leaves
+these errors unknown, with its message.
 """
 
 from collections.abc import Callable, Mapping
@@ -41,12 +42,12 @@ Sizes = Callable[[Any, Path], Mapping[str, float]]
 
 @dataclass(frozen=True, slots=True)
 class FigureError:
-    """Error of a figure.
+    """Estimated error of a figure, such as a peak strain.
 
     Attributes:
-        discretisation: Grid convergence index relative to the figure; None if unknown.
-        order: Observed order; None without one.
-        two_scale: Relative error of two scales; None for one model, or if unknown.
+        discretisation: Grid convergence index over the magnitude of the figure, a ratio; None if unknown.
+        order: Observed order of convergence in the element size; None without one.
+        two_scale: Relative error of two scales, a ratio; None for one model, or if unknown.
         how: Origin of the discretisation error, or why it is unknown.
         two_scale_how: Origin of the error of two scales, or why it is unknown; empty for one model.
     """
@@ -60,10 +61,10 @@ class FigureError:
 
 @dataclass(frozen=True, slots=True)
 class TwoScales:
-    """Errors of two scales of a run.
+    """Errors of a two-scale run against one model without scales.
 
     Attributes:
-        errors: Relative error of each figure.
+        errors: Relative error of each figure by name, a ratio; empty if unknown or for one model.
         how: Origin of the errors, or why they are unknown; empty for one model.
     """
 
@@ -88,13 +89,15 @@ class _Coarser:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """Reading of the figures of a kind of case.
+    """Functions that read the figures of a kind of case (drop or structure).
 
     Attributes:
-        figures: Function from the folder of a model, that of the first model of the run, and an end [s] or None, to the
-            figures by name.
-        sizes: Function from the case and its shock to the realised element size of each companion.
-        family: Function from the name of a figure to its family in words, empty without a family.
+        figures: Function from the folder of a model, the folder of the first model of the run, and an end [s] or None,
+            to the figures: values in SI units by name.
+        sizes: Function from the case and the folder of its shock to the realised element size of each companion (the
+            same case on a coarser mesh) relative to the case, by name.
+        family: Function from the name of a figure to its family in words, empty without a family; the discretisation
+            error of a figure is at least the median of its family.
     """
 
     figures: Figures
@@ -103,12 +106,17 @@ class Reading:
 
 
 def estimate_errors(reading: Reading, run: Run[Any], folder: Path) -> Findings:
-    """Write ``errors.json``: the errors of the figures of a shock; return the cost of its companions.
+    """Write ``errors.json``, the errors of the figures of a shock by name, and return the cost of its companions.
+
+    Companions are runs of the same case on coarser meshes. A missing or failed one leaves its errors unknown (null).
 
     Args:
-        reading: Figures of the kind of case.
-        run: Run folder with the shock and its companions.
-        folder: Folder of the product.
+        reading: Functions that read the figures of this kind of case.
+        run: Run folder with the shock and its companions, case, cores.
+        folder: Existing folder of the product, into which ``errors.json`` is written.
+
+    Returns:
+        ``Findings`` with the metric ``companion_cost_share``: processor time of the companions over that of the shock.
     """
     main = first_model(run.folder / UNTIL)
     figures, realised = reading.figures, reading.sizes(run.case, run.folder / UNTIL)
@@ -125,7 +133,14 @@ def estimate_errors(reading: Reading, run: Run[Any], folder: Path) -> Findings:
 
 
 def first_model(shock: Path) -> Path:
-    """Return the folder of the results of the first model of a shock."""
+    """Return the folder of the results of the first model of a shock, in the order of ``MODELS``.
+
+    Args:
+        shock: Folder of the product of the shock, with a folder for each model.
+
+    Raises:
+        StopIteration: The shock has no folder of a model.
+    """
     return next(folder for model in MODELS if (folder := shock / model).is_dir())
 
 

@@ -1,4 +1,4 @@
-"""Figures whose errors companions estimate, from the results of one model of a shock."""
+"""Figures of a shock, such as peak strains, whose errors are estimated from companions (the case on coarser meshes)."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -21,12 +21,15 @@ NOT_CONVERGENT = "peak_element_stress"  # grows with refinement, as do its value
 
 
 def drop_figures(results: Path, main: Path, end: float | None = None) -> dict[str, float]:
-    """Return the figures of a drop by name of the metric; those of a joint belong to the critical joint of the run.
+    """Return the figures of a drop, values in SI units by name of the metric.
+
+    Those of a joint belong to the critical joint of the run; they are absent without one.
 
     Args:
-        results: Folder of the results of one model.
-        main: Folder of the results of the first model of the run.
-        end: Time until which peaks count [s], without figures at points; None for the whole run.
+        results: Folder of the results of one model, with ``result.json`` and ``history.npz``.
+        main: Folder of the results of the first model of the run, which names the critical joint.
+        end: Time until which peaks count [s]; the figures are then those of joint and board, without watch points. None
+            for the whole run.
     """
     import numpy as np
 
@@ -45,30 +48,38 @@ def drop_figures(results: Path, main: Path, end: float | None = None) -> dict[st
 
 
 def structure_figures(results: Path, _main: Path, _end: float | None = None) -> dict[str, float]:
-    """Return the figures of a structure by name of the metric: at watch points, of supports, natural frequencies.
+    """Return the figures of a structure, values in SI units by name: at watch points, of supports, natural frequencies.
 
     Args:
-        results: Folder of the results of one model.
+        results: Folder of the results of one model, with ``result.json``.
+        _main: Folder of the results of the first model of the run, not used.
+        _end: Time until which peaks count, not used.
     """
     return _chosen(results, lambda name: name.startswith(OF_STRUCTURE) or name.endswith(FREQUENCY))
 
 
 def drop_family(name: str) -> str:
-    """Return the family of a figure of a drop whose figures share the errors of one mesh; empty without a family."""
+    """Return the family of a figure of a drop: "the board", "the joint" or, without a family, an empty text.
+
+    The figures of a family share the errors of one mesh.
+
+    Args:
+        name: Name of the figure, such as ``peak_board_strain`` or ``peak_strain@corner``.
+    """
     if name in BOARD or name.startswith(DEFLECTIONS):
         return "the board"
     return "" if "@" in name else "the joint"
 
 
 def reading_distances(case: Any, results: Path) -> dict[str, float]:
-    """Return the distance of each watch point from the node at which a run reads it, by name [m].
+    """Return the distance of each watch point from the node at which a run reads it [m], by name of the point.
 
     Only points that are farther than a tenth of a millimetre from their node are included: there a finer mesh reads
     another place, which the companions may not show.
 
     Args:
-        case: Case with watch points.
-        results: Folder of the results of one model.
+        case: Case with watch points, in its mapping ``watch``.
+        results: Folder of the results of one model, with ``history.npz``.
     """
     import numpy as np
 
@@ -81,7 +92,11 @@ def reading_distances(case: Any, results: Path) -> dict[str, float]:
 
 
 def divergent_figures(results: Path) -> list[str]:
-    """Return the names of the metrics of a model that do not converge under refinement."""
+    """Return the names of the metrics of a model that do not converge under refinement: peak element stresses.
+
+    Args:
+        results: Folder of the results of one model, with ``result.json``.
+    """
     return [name for name in read_json(results / "result.json")["metrics"] if name.startswith(NOT_CONVERGENT)]
 
 

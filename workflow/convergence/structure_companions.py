@@ -1,7 +1,8 @@
-"""Companions of a structure: the same motion on two coarser meshes, and if needed with half the coupling window.
+"""Companions of a structure: the same motion on coarser meshes, or with half the window, run to estimate errors.
 
-Fewer than four elements along an axis stay, because they cannot be coarsened by 1.5: a plate with one element over its
-thickness would have no bending strain at the middle of the element.
+A window is the interval between two exchanges of the coupled models. Fewer than four elements along an axis stay,
+because they cannot be coarsened by 1.5: a plate with one element over its thickness would have no bending strain at the
+middle of the element.
 """
 
 from collections.abc import Sequence
@@ -18,10 +19,15 @@ CHEAP = 0.3  # largest cost of one model on the coarsest mesh, over that of the 
 
 
 def structure_companions(case: StructureCase, _shock: Path | None) -> dict[str, StructureCase]:
-    """Return the companions of a structure by name; none if the case estimates no errors.
+    """Return the companions of a structure, the same case on coarser meshes from whose results errors are estimated.
 
     Args:
         case: Case of the run.
+        _shock: Folder of the results of its shock, not used.
+
+    Returns:
+        Case of each companion by name, ``size_1.5``, ``size_2`` and perhaps ``half_window``; empty if the case
+        estimates no errors.
     """
     if not case.estimates_errors:
         return {}
@@ -33,13 +39,14 @@ def structure_companions(case: StructureCase, _shock: Path | None) -> dict[str, 
 
 
 def structure_sizes(case: StructureCase, shock: Path) -> dict[str, float]:
-    """Return the realised size of the elements of each companion relative to the case, by name.
+    """Return the realised element size of each companion, the case on a coarser mesh, relative to the case, by name.
 
-    Rounded numbers of elements differ from the nominal size. Axes along which the number stays do not count.
+    Rounded numbers of elements differ from the nominal size. Axes along which the number stays do not count; the size
+    is the geometric mean of the others, 1 without any.
 
     Args:
         case: Case of the run.
-        shock: Product of its shock.
+        shock: Folder of the results of its shock.
     """
     return {name: _relative_size(case, copy) for name, copy in structure_companions(case, shock).items()}
 

@@ -1,4 +1,4 @@
-"""Companions of a point: the same case on coarser meshes, from which the stage errors estimates its errors."""
+"""Companions of a point: the same case on coarser meshes, run so that the stage errors can estimate its errors."""
 
 from collections.abc import Iterable
 
@@ -11,7 +11,16 @@ from reflowshock.workflow.store.store import Store
 
 
 def companion_points(store: Store, point: Point) -> dict[str, Point]:
-    """Return the companions of a point by name; none before its shock is complete, which decides them."""
+    """Return the companions of a point by name: the same case on coarser meshes, run to estimate its errors.
+
+    Args:
+        store: Store of the products.
+        point: Case with settings.
+
+    Returns:
+        Points such as ``size_1.5`` and ``size_2``; empty if the case estimates no errors, or before its shock is
+        complete, because the shock decides their joints and duration.
+    """
     names = point.case.pipeline.names
     if UNTIL not in names or store.record(point, UNTIL) is None:
         return {}
@@ -20,7 +29,17 @@ def companion_points(store: Store, point: Point) -> dict[str, Point]:
 
 
 def companion_seconds(store: Store, point: Point) -> dict[str, float]:
-    """Predict the wall time of each missing companion on one core [s]; empty if the case has none."""
+    """Predict the wall time of each missing companion (same case on a coarser mesh) on one core, by name [s].
+
+    Only stages whose products are neither shared with the point nor in the store count.
+
+    Args:
+        store: Store of the products.
+        point: Case with settings, whose shock may be complete or not.
+
+    Returns:
+        Times [s]; empty if the case has no companions or none is missing.
+    """
     points = companion_points(store, point)
     if not points:
         expected = kind_of(point.case).companions(point.case, None)
@@ -33,7 +52,13 @@ def companion_seconds(store: Store, point: Point) -> dict[str, float]:
 
 
 def at_once(seconds: Iterable[float]) -> float:
-    """Return the wall time of companions that run at once, one core each [s]."""
+    """Return the wall time of runs that share the cores of this machine, one core each [s].
+
+    It is the longest time, or the sum over the number of available cores if that is larger.
+
+    Args:
+        seconds: Wall time of each run on one core [s]; without any the result is 0.
+    """
     times = list(seconds)
     return max(max(times, default=0.0), sum(times) / available_cores())
 

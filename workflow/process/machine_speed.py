@@ -26,13 +26,14 @@ UNMEASURED = "Steps are assumed to be as fast as on the reference machine; this 
 
 @dataclass(frozen=True, slots=True)
 class MachineSpeed:
-    """Measured slowness.
+    """Measured slowness of this machine.
 
     Attributes:
-        slowness: Time of an element update over that of the reference machine, geometric mean of the element families.
-        families: The same of each family.
+        slowness: Time of an element update over that of the reference machine (above 1: slower), geometric mean of the
+            element families.
+        families: The same ratio of each element family, by name.
         date: Day of the measurement, ISO format.
-        busy: Number of cores of the program that others used.
+        busy: Mean number of cores of this process that other programs used during the measurement.
     """
 
     slowness: float
@@ -49,11 +50,12 @@ class MachineSpeed:
 
 
 def machine_speed() -> MachineSpeed | None:
-    """Return the measured slowness of this machine; None before the first measurement or if its file is damaged.
+    """Return the measured slowness of this machine, from its file in the folder of compiled kernels.
 
     Returns:
         Mean slowness (time of an element update over the time of the reference machine), slowness of each element
-        family, day of the measurement, and number of cores that other programs used.
+        family, day of the measurement, and number of cores that other programs used; None before the first measurement,
+        or if the file is damaged.
     """
     folder = kernel_folder()
     with suppress(OSError, ValueError, TypeError):
@@ -63,16 +65,20 @@ def machine_speed() -> MachineSpeed | None:
 
 
 def slowness() -> float:
-    """Return the time that this machine needs over the time of the reference machine; one if it is not yet measured."""
+    """Return the time of an element update on this machine over that on the reference machine.
+
+    It is one if the machine is not yet measured; above one the machine is slower.
+    """
     speed = machine_speed()
     return 1.0 if speed is None else speed.slowness
 
 
 def measure_after(predicted: float) -> None:
-    """Measure the slowness of this machine after a shock and store it in a file; takes up to some minutes.
+    """Measure the slowness of this machine after a shock and store it in a file; takes up to five minutes.
 
     Nothing is measured after a shock predicted below ``LONG`` (30 s), without a folder for the file, or if there
-    already is a measurement that other programs disturbed little. Errors are ignored.
+    already is a measurement during which other programs used at most ``IDLE`` (0.25) cores. If the measurement fails,
+    the earlier file stays, and no error is raised.
 
     Args:
         predicted: Predicted wall time of the shock without compilation [s].

@@ -19,7 +19,12 @@ NEARLY_IDLE = 0.5  # share of a core that a rank needs at least
 
 @dataclass(frozen=True, slots=True)
 class RankCount:
-    """Number of MPI ranks, and the reason for it (empty if the case gives the number)."""
+    """Number of MPI ranks, and the reason for it.
+
+    Attributes:
+        ranks: Number of ranks.
+        why: Reason in words; empty if the case or a cluster job gives the number.
+    """
 
     ranks: int
     why: str = ""
@@ -30,12 +35,15 @@ class RankCount:
 
 
 def decide_ranks(least: int, most: int, cores: int) -> RankCount:
-    """Return the number of MPI ranks for a run; takes ``PROBE`` seconds if it has to be decided.
+    """Return the number of MPI ranks for a run, as many as cores are idle; measuring them takes ``PROBE`` (0.25 s).
+
+    Nothing is measured, and the result is ``most``, if both limits are equal or in a job of a cluster; with at most
+    ``least`` cores it is ``least``.
 
     Args:
         least: Smallest number that the case allows.
         most: Largest number that the case allows; equal to ``least`` if the case gives the number.
-        cores: Cores that the run may use.
+        cores: Number of cores that the run may use.
     """
     if least == most or LAUNCHER in os.environ:  # a cluster job has cores of its own for all ranks
         return RankCount(most)
@@ -46,19 +54,23 @@ def decide_ranks(least: int, most: int, cores: int) -> RankCount:
 
 
 def idle_cores(seconds: float = PROBE) -> float:
-    """Return how many of the cores that this process may use are idle, as a mean over some time [s]."""
+    """Return how many of the cores that this process may use are idle, as a mean over the measured time.
+
+    Args:
+        seconds: Time of the measurement, during which the function sleeps [s].
+    """
     allowed, before = os.sched_getaffinity(0), core_times()
     time.sleep(seconds)
     return idle_between(before, core_times(), allowed)
 
 
 def idle_between(before: Mapping[int, tuple[int, int]], after: Mapping[int, tuple[int, int]], cores: set[int]) -> float:
-    """Return the mean number of idle cores between two readings; unknown cores count as idle.
+    """Return the mean number of idle cores between two readings of ``core_times``; unknown cores count as idle.
 
     Args:
-        before: Core -> idle and total time, see ``core_times``.
-        after: The later reading.
-        cores: Cores to count.
+        before: Earlier reading: number of a core -> idle time and total time [ticks].
+        after: Later reading in the same form.
+        cores: Numbers of the cores to count.
     """
     idle = 0.0
     for core in cores:
@@ -70,7 +82,11 @@ def idle_between(before: Mapping[int, tuple[int, int]], after: Mapping[int, tupl
 
 
 def core_times() -> dict[int, tuple[int, int]]:
-    """Return idle and total time of each core since the system started, in ticks; empty without ``/proc/stat``."""
+    """Return the times of each core since the system started.
+
+    Returns:
+        Number of the core -> idle time (with waits for disks) and total time [ticks]; empty without ``/proc/stat``.
+    """
     try:
         lines = STAT.read_text(encoding="ascii").splitlines()
     except OSError:

@@ -1,4 +1,7 @@
-"""Companions of a run in its store: the same case on coarser meshes, linked in the work folder of the stage errors."""
+"""Companions of a run in its store: the same case on coarser meshes, run to estimate errors.
+
+They are linked in the work folder of the stage errors.
+"""
 
 import os
 from collections.abc import Mapping
@@ -19,7 +22,11 @@ Companions = Mapping[str, Point]
 
 
 def size_name(size: float) -> str:
-    """Return the name of a companion from its element size relative to the case."""
+    """Return the name of a companion (the same case on a coarser mesh), such as ``size_1.5``.
+
+    Args:
+        size: Element size relative to the case.
+    """
     return f"size_{size:g}"
 
 
@@ -27,19 +34,36 @@ COARSEST = size_name(SIZES[-1])
 
 
 def companion_title(name: str) -> str:
-    """Return the difference of a companion from its case in words."""
+    """Return the difference of a companion from its case in words, such as "elements x 1.5".
+
+    Args:
+        name: Name of the companion, from ``size_name``, or ``half_window``.
+    """
     if name == HALF_WINDOW:
         return f"elements x {SIZES[-1]:g}, half the window"
     return f"elements x {name.removeprefix(size_name(0.0)[:-1])}"
 
 
 def companion_folder(run_folder: Path, name: str) -> Path:
-    """Return the folder with the products of a companion."""
+    """Return the folder with the products of a companion (the same case on a coarser mesh), which may not exist.
+
+    Args:
+        run_folder: Run folder, or work folder of the stage errors.
+        name: Name of the companion, such as ``size_2``.
+    """
     return run_folder / FOLDER / name
 
 
 def link_companions(store: Store, work: Path, companions: Companions) -> None:
-    """Link the results of companions into the work folder of the stage errors; write the message of each failure."""
+    """Link the shocks of companions into the work folder of the stage errors.
+
+    For a companion without a result, the file ``failed.txt`` in its folder has the message of the stage that failed.
+
+    Args:
+        store: Store of the products, read only.
+        work: Work folder of the stage; the folders of companions are created in it, and earlier links replaced.
+        companions: Point (case with settings) of each companion by name; each is the same case on a coarser mesh.
+    """
     for name, point in companions.items():
         folder = companion_folder(work, name)
         folder.mkdir(parents=True, exist_ok=True)
