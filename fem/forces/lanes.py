@@ -1,4 +1,7 @@
-"""Order of elements in blocks of a few lanes, such that blocks of equal shapes share their constants."""
+"""Order of elements in blocks of a few lanes, such that blocks of equal shapes share their constants.
+
+A lane is the place of one element in a block; a SIMD instruction works on all lanes of a block.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -28,7 +31,7 @@ class Lanes:
 
     @property
     def width(self) -> int:
-        """Number of lanes."""
+        """Number of lanes of a block."""
         return self.element.shape[1]
 
     @property
@@ -37,16 +40,34 @@ class Lanes:
         return np.arange(self.width) < self.filled[:, None]
 
     def spread(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return values of patterns ``(np, m, width k)``, lanes innermost, from values of shapes ``(ns, m, k)``."""
+        """Return values of each lane of the patterns from values of the distinct shapes.
+
+        Args:
+            values: Values of each shape, shape (ns, m, k), any unit.
+
+        Returns:
+            Shape (np, m, width k), lanes innermost: entry i of lane e at ``width i + e``.
+        """
         moved = values[self.pattern_shapes].transpose(0, 2, 3, 1)
         return np.ascontiguousarray(moved).reshape(*moved.shape[:2], -1)
 
     def view(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return a view of values with the lanes as second axis, ``(n, width, ..., k)`` of ``(n, ..., width k)``."""
+        """Return a view, not a copy, of values with the lanes as second axis.
+
+        Args:
+            values: Values with the lanes innermost, shape (n, ..., width k).
+
+        Returns:
+            Shape (n, width, ..., k).
+        """
         return np.moveaxis(values.reshape(*values.shape[:-1], -1, self.width), -1, 1)
 
     def nodes(self, elements: Elements) -> NDArray[np.int32]:
-        """Return the nodes of the elements of each block, lanes innermost, shape (nb, k, width) int32."""
+        """Return the nodes of the elements of each block, lanes innermost, shape (nb, k, width) int32.
+
+        Args:
+            elements: Elements that were arranged, k nodes each.
+        """
         return np.ascontiguousarray(elements.cells[self.element].transpose(0, 2, 1), dtype=np.int32)
 
 
@@ -57,12 +78,13 @@ def arrange(elements: Elements, group: NDArray[np.integer], width: int) -> Lanes
     and their copies follow in the next blocks.
 
     Args:
-        elements: Elements of one kind.
+        elements: Elements of one kind, at least one: points, cells, materials.
         group: Group of each element, such as its material, shape (ne,), not negative.
         width: Number of lanes of a block.
 
     Returns:
-        Order of the elements: element of each lane (nb, width), elements per block, and the shapes that blocks share.
+        ``Lanes``, the order of the elements: element of each lane (nb, width), elements per block, and the shapes that
+        blocks share.
     """
     first, shape = classes(replace(elements, density=np.zeros(len(elements.cells))))
     node = elements.cells.min(axis=1)

@@ -1,4 +1,7 @@
-"""Elements in blocks of sixteen lanes for the nonlinear kernels: order, constants of shapes, initial state."""
+"""Elements in blocks of lanes for the nonlinear kernels: order, constants of shapes, initial state.
+
+A lane is the place of one element in a block. Blocks have sixteen lanes, those of one-point hexahedra ``WIDTH``.
+"""
 
 from dataclasses import replace
 
@@ -33,11 +36,13 @@ def merge_equal_materials(elements: Elements, plastic: NDArray[np.float64]) -> t
     """Merge equal materials, since many parts share one.
 
     Args:
-        elements: Elements with an elasticity for each of nm materials.
+        elements: Elements with the index of their material, and the elasticity of nm materials, shape (nm, 6, 6) [Pa];
+            not changed.
         plastic: 3 G, A, B [Pa], n, C and reference rate [1/s] of each material (Johnson and Cook), shape (nm, 6).
 
     Returns:
-        Elements and plastic constants, shape (nd, 6), of the nd distinct materials.
+        Elements with elasticity and material numbers of the nd distinct materials, and their plastic constants, shape
+        (nd, 6).
     """
     constants = np.column_stack([elements.elasticity.reshape(len(plastic), -1), plastic])
     _, first, material = np.unique(constants, axis=0, return_index=True, return_inverse=True)
@@ -50,9 +55,12 @@ def gradient_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float6
 
     Args:
         elements: Tetrahedra with 4 or 10 nodes.
-        lanes: Their order, from ``arrange``.
+        lanes: Their order in blocks of sixteen lanes, from ``arrange``.
         plastic: 3 G, A, B [Pa], n, C and reference rate [1/s] of each material (Johnson and Cook), shape (nm, 6).
         finite: Whether kinematics are finite (the state then holds stretches) instead of small.
+
+    Raises:
+        ValueError: The elasticity of a material couples normal strain and shear, or two shears.
     """
     corners, kind = elements.points[elements.cells[lanes.shape]], elements.kind
     gradient, determinant = (TETRAHEDRON if kind.nodes == 4 else TEN_NODES).gradients(corners)
@@ -68,13 +76,16 @@ def gradient_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float6
 
 
 def one_point_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.float64], finite: bool) -> OnePointBlocks:
-    """Return stress-free one-point hexahedra in blocks of ``WIDTH``, the arguments of the nonlinear kernels.
+    """Return stress-free one-point hexahedra in blocks of ``WIDTH`` lanes, the arguments of the nonlinear kernels.
 
     Args:
         elements: Hexahedra of the one-point formulation.
-        lanes: Their order, from ``arrange``.
+        lanes: Their order in blocks of ``WIDTH`` lanes, from ``arrange``.
         plastic: 3 G, A, B [Pa], n, C and reference rate [1/s] of each material (Johnson and Cook), shape (nm, 6).
         finite: Whether kinematics are finite (the state then holds stretches) instead of small.
+
+    Raises:
+        ValueError: The elasticity of a material couples normal strain and shear, or two shears.
     """
     shapes = elements.subset(lanes.shape)
     volume = element_geometry(shapes.points, shapes.cells).volume
@@ -133,8 +144,11 @@ def hexahedron_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.floa
 
     Args:
         elements: Hexahedra with incompatible modes.
-        lanes: Their order, from ``arrange``.
+        lanes: Their order in blocks of sixteen lanes, from ``arrange``.
         plastic: 3 G, A, B [Pa], n, C and reference rate [1/s] of each material (Johnson and Cook), shape (nm, 6).
+
+    Raises:
+        ValueError: The elasticity of a material couples normal strain and shear, or two shears.
     """
     corners = elements.points[elements.cells[lanes.shape]]
     count = len(corners)
@@ -159,7 +173,7 @@ def hexahedron_blocks(elements: Elements, lanes: Lanes, plastic: NDArray[np.floa
 
 
 def gauss_volumes(position: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the volumes at the Gauss points ``(k, 8)`` of hexahedra, up to a common factor.
+    """Return the volumes at the Gauss points of hexahedra up to a common factor, shape (k, 8).
 
     Args:
         position: Walsh-Hadamard transform of the corner positions, parities 1 to 7 (bit d: odd along direction d; order
@@ -216,7 +230,7 @@ def initial_state(lanes: Lanes, points: int, finite: bool) -> NDArray[np.float64
     """Return the stress-free state of elements in blocks.
 
     Args:
-        lanes: Order of the elements.
+        lanes: Order of the elements in nb blocks of ``width`` lanes, from ``arrange``.
         points: Number of integration points m of an element.
         finite: Whether strains are finite; the stretches of the state are then the identity, otherwise 0 and not used.
 

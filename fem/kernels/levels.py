@@ -86,7 +86,7 @@ structref.define_proxy(PacedForces, PacedForcesType, ["arrays", "every"])
 
 @njit(cache=True)
 def forces_of(arrays):
-    """Wrap the kernel arguments of all force terms, a ``ForceArrays``, in a ``Forces``, which is passed by pointer."""
+    """Return a ``Forces``, passed by pointer, with the kernel arguments of all force terms, a ``ForceArrays``."""
     return Forces(*arrays)
 
 
@@ -146,7 +146,7 @@ class Interface(NamedTuple):
 
 @njit(inline="always")  # compiled once, inside ``take_steps``
 def add_forces(arrays, displacement, force):
-    """Subtract the internal force of the terms in ``Forces`` at displacements ``(n, 3)`` [m] from ``force (n, 3)`` [N].
+    """Subtract the internal force of ``arrays``, ``Forces``, at ``displacement (n, 3)`` [m] from ``force (n, 3)`` [N].
 
     Returns:
         ``ALL_FINE`` (-1) and 0, or, with an inverted element, index of its term into ``NAMES`` and its block or row.
@@ -308,7 +308,7 @@ def add_paced_forces(motion, forces, substep, pushed, final):
 
 @njit(cache=True)
 def gather_forces(motion, moved, final):
-    """Move forces of the first ``moved`` slave nodes to their masters; if ``final``, store them and move ``ahead``."""
+    """Move forces of the first ``moved`` slaves of ``StepArrays`` to masters; ``final``: store them, move ``ahead``."""
     slave, master, weight = motion.slave[:moved], motion.master[:moved], motion.weight[:moved]
     force = motion.state[2]
     for i in range(moved if final else 0):
@@ -382,8 +382,10 @@ def run_levels(levels, first, values, force):
     For levels with one assembled matrix and no node of another rank; same operations and order as the kernels above.
 
     Args:
-        levels: Tuples, outermost first: arguments rows, foreign, coefficients (p, 3), inverse, change, state of
-            the kernels above; row pointers (n + 1,), columns (nb,), blocks (nb, 3, 3) of its stiffness [N/m].
+        levels: Tuples, outermost first: rows of its n nodes in ``values``; nodes that another rank adds; coefficients
+            of ``take_substep`` (p, 3); DT^2 / m (nf, 3) [s^2/kg] and last displacement change (nf, 3) [m] of free
+            nodes; state (3, n, 3): displacement [m], force, sum of forces [N]; row pointers (n + 1,), columns (nb,),
+            blocks (nb, 3, 3) of its stiffness [N/m]. Change and state are updated.
         first: Index of the level, scalar.
         values: Displacement of the surrounding level, shape (>= n, 3) [m].
         force: Force of the surrounding level, shape (>= n, 3) [N], added to.

@@ -37,10 +37,10 @@ def move(state, mobility, nodes, kicks, steps):
         state: Displacement [m], velocity half a step back [m/s] and force [N], shape (3, n, 3); the first two are
             updated.
         mobility: Inverse mass, zero where the velocity is prescribed, shape (n, 3) [1/kg].
-        nodes: First node of the range and the node after its last, two integers.
+        nodes: Tuple of integers: first node of the range and the node after its last.
         kicks: Contributions of the body force: velocity in the first step, velocity in the others [m/s], and
             displacement by the latter [m], one row each with components x, y, z, shape (3, 3).
-        steps: Time step dt, scalar [s], and number of steps, integer.
+        steps: Tuple: time step dt, scalar [s], and number of steps, integer.
     """
     step, span = steps[0], steps[0] * steps[1]
     strips = np.empty((3, STRIP))
@@ -61,7 +61,7 @@ def move(state, mobility, nodes, kicks, steps):
 
 @njit(cache=True)
 def kicks_of(accelerations, step, kicks):
-    """Compute what a body force adds to velocity and displacement in several steps taken at once, for ``move``.
+    """Compute what a body force adds to velocity and displacement in k steps that are taken at once.
 
     Args:
         accelerations: Body acceleration as each step begins, shape (k, 3) [m/s^2].
@@ -95,12 +95,12 @@ def first_moment(mass, places):
 
 @njit(cache=True)
 def work_of_changes(nodes, changes, accelerations, step):
-    """Return the work [J] of the varying part of a body force in steps that ``move`` has taken at once.
+    """Return the work of the varying part of a body force in k steps taken at once, scalar [J].
 
     Args:
         nodes: Tuple: nodal masses in the energy balance (n,) [kg], velocities after the steps (n, 3) [m/s], inverse
             masses, zero where the velocity is prescribed, (n, 3) [1/kg].
-        changes: Mean of the varying part in each step, shape (k, 3) [m/s^2].
+        changes: Mean of the varying part of the acceleration in each step, shape (k, 3) [m/s^2].
         accelerations: Whole body acceleration as each step begins, shape (k, 3) [m/s^2].
         step: Time step dt, scalar [s].
     """
@@ -165,7 +165,13 @@ def gather_from_slaves(slave, master, weight, values):
 
 @njit(cache=True)
 def pack(values, rows, buffer):
-    """Copy the rows ``rows (m,)`` of nodal vectors ``values (n, 3)`` into a message ``buffer (m, 3)``."""
+    """Copy rows of nodal values into a message.
+
+    Args:
+        values: Nodal values, shape (n, 3), any unit.
+        rows: Numbers of the nodes to copy, shape (m,).
+        buffer: Message, shape (m, 3), overwritten.
+    """
     for i in range(len(rows)):
         for c in range(3):
             buffer[i, c] = values[rows[i], c]
@@ -173,7 +179,13 @@ def pack(values, rows, buffer):
 
 @njit(cache=True)
 def unpack(buffer, rows, values):
-    """Copy a message ``buffer (m, 3)`` into the rows ``rows (m,)`` of nodal vectors ``values (n, 3)``."""
+    """Copy a message into rows of nodal values.
+
+    Args:
+        buffer: Message, shape (m, 3), any unit.
+        rows: Numbers of the nodes, shape (m,).
+        values: Nodal values, shape (n, 3); these rows are overwritten.
+    """
     for i in range(len(rows)):
         for c in range(3):
             values[rows[i], c] = buffer[i, c]
@@ -299,8 +311,8 @@ def link_velocities(rows, velocity, force, terms, link):
 def add_damping(velocity, mobility, frame, coefficients, forces):
     """Add the mass-proportional force -c m (v - v0 + dt/2 (f / m + g)) to the damping, and all damping to the force f.
 
-    The loop runs over strips of all components together, as in ``move``; for the same reason no operation may be
-    reordered or fused.
+    The loop runs over strips of all components together; reordered or fused operations would let copies of a node on
+    several ranks drift apart.
 
     Args:
         velocity: Velocity v half a step back, shape (n, 3) [m/s].

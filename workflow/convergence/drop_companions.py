@@ -1,7 +1,8 @@
-"""Companions of a drop: the same drop on two coarser meshes, and if needed with half the window.
+"""Companions of a drop: the same drop on coarser meshes, or with half the window, run to estimate errors.
 
-The fine joints and the end of a companion are those of the run. The coarsest companion gives the error of two scales:
-by one model of the same drop where that is cheap, otherwise by a further companion with half the window.
+A window is the interval between two exchanges of the coupled models. The fine joints and the end of a companion are
+those of the run. The coarsest companion gives the error of two scales: by one model of the same drop where that is
+cheap, otherwise by a further companion with half the window.
 """
 
 from pathlib import Path
