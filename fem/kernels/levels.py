@@ -42,8 +42,7 @@ class ForceArrays(NamedTuple):
         congruent: Nodes, axes, rows, blocks and lines of ``kernels.box_rows``.
         assembled: Pointer, columns and blocks of ``kernels.force.add_block_force``.
         turning_rows: Nodes, axes, rows, scales, constants and lines of ``box_rotation.add_turned_row_forces``.
-        turning_boxes: Cells, filled, pattern and constants of ``vectors.box.add_turned_block_forces``.
-        turning: Cells, filled, pattern and constants of ``turned_hexahedron.add_turned_forces``.
+        turning_boxes, turning: Nodes, filled, pattern and constants of ``vectors.box`` and ``turned_hexahedron``.
         one_point, hexahedron, path: Blocks of ``nonlinear_one_point`` and ``nonlinear_hexahedron``, and their ``Path``.
     """
 

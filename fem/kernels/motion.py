@@ -165,13 +165,7 @@ def gather_from_slaves(slave, master, weight, values):
 
 @njit(cache=True)
 def pack(values, rows, buffer):
-    """Copy rows of nodal values into a message.
-
-    Args:
-        values: Nodal values, shape (n, 3), any unit.
-        rows: Numbers of the nodes to copy, shape (m,).
-        buffer: Message, shape (m, 3), overwritten.
-    """
+    """Copy the rows ``rows (m,)`` of nodal values ``values (n, 3)``, any unit, into a message ``buffer (m, 3)``."""
     for i in range(len(rows)):
         for c in range(3):
             buffer[i, c] = values[rows[i], c]
@@ -179,13 +173,7 @@ def pack(values, rows, buffer):
 
 @njit(cache=True)
 def unpack(buffer, rows, values):
-    """Copy a message into rows of nodal values.
-
-    Args:
-        buffer: Message, shape (m, 3), any unit.
-        rows: Numbers of the nodes, shape (m,).
-        values: Nodal values, shape (n, 3); these rows are overwritten.
-    """
+    """Copy a message ``buffer (m, 3)``, any unit, into the rows ``rows (m,)`` of nodal values ``values (n, 3)``."""
     for i in range(len(rows)):
         for c in range(3):
             values[rows[i], c] = buffer[i, c]

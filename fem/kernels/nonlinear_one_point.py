@@ -62,7 +62,7 @@ class OnePointBlocks(NamedTuple):
         pattern: ``(nb,)`` int32 index into ``constants`` and ``weight``.
         material: ``(nb,)`` int32, one material a block.
         elastic: ``(nm, 9)`` [Pa] C_xx, C_yy, C_zz, C_xy, C_yz, C_xz, G_xy, G_yz, G_xz.
-        plastic: ``(nm, 6)``, see ``materials.plasticity.plastic_constants``.
+        plastic: ``(nm, 6)``: 3 G, A, B [Pa], n, C and reference rate [1/s] (Johnson and Cook).
         constants: ``(np, WIDTH * 120)``, of each lane those of ``kernels.turned_hexahedron``.
         weight: ``(np, 1, WIDTH)`` [m^3] volume.
         state: ``(nb, 1, WIDTH * 13)``: stress [Pa], plastic strain, stretch; entry i of element e at ``WIDTH i + e``.

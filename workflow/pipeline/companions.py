@@ -31,7 +31,7 @@ def companion_points(store: Store, point: Point) -> dict[str, Point]:
 def companion_seconds(store: Store, point: Point) -> dict[str, float]:
     """Predict the wall time of each missing companion (same case on a coarser mesh) on one core, by name [s].
 
-    Only stages whose products are neither shared with the point nor in the store count.
+    Stages whose products are shared with the point do not count, nor, once its shock is complete, those in the store.
 
     Args:
         store: Store of the products.

@@ -76,7 +76,7 @@ def slowness() -> float:
 def measure_after(predicted: float) -> None:
     """Measure the slowness of this machine after a shock and store it in a file; takes up to five minutes.
 
-    Nothing is measured after a shock predicted below ``LONG`` (30 s), without a folder for the file, or if there
+    Nothing is measured after a shock predicted below ``LONG`` (60 s), without a folder for the file, or if there
     already is a measurement during which other programs used at most ``IDLE`` (0.25) cores. If the measurement fails,
     the earlier file stays, and no error is raised.
 

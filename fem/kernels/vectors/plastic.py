@@ -58,7 +58,7 @@ def started(above, before, law):
     - y_c)); W is Lambert's function to 1 % (Iacono & Boyd, Adv. Comput. Math. 43, 2017).
 
     Args:
-        above: Trial von Mises stress above the static yield stress q - Y, SIMD vector [Pa].
+        above: Excess q - Y of the trial von Mises stress q over the static yield stress Y, SIMD vector [Pa].
         before: Hardening before the step, SIMD vector [Pa].
         law: Constants of ``law_at``, six scalars: 3 G, first yield stress, B [Pa], n, C, reference increment.
     """
