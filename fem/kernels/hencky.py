@@ -269,9 +269,10 @@ def one_point(shape, displacement, materials, states):
     Args:
         shape: ``Shape`` of all elements: mean strain matrices (ne, 1, 6, 24) [1/m], volumes (ne, 1) [m^3].
         displacement: Displacement node by node, less free expansion, shape (ne, 24) [m].
-        materials: Tuple: elasticities (nm, 6, 6) [Pa], plastic constants (nm, 6), material index of each element (ne,).
-        states: ``ElementState``, written: stress [Pa] and plastic strain (ne, 1, 7), internal force (ne, 24) [N],
-            tangent (ne, 24, 24) [N/m].
+        materials: Tuple: elasticities (nm, 6, 6) [Pa], plastic constants (nm, 6) as ``hencky`` names them, material
+            index of each element (ne,).
+        states: ``ElementState``, written, its old content is not read: six stresses [Pa] and the equivalent plastic
+            strain (ne, 1, 7), internal force (ne, 24) [N], tangent (ne, 24, 24) [N/m].
     """
     elasticity, plastic, material = materials
     for e in range(len(displacement)):

@@ -119,12 +119,13 @@ def correct_pressure(
     Args:
         poisson: Poisson problem: operators, particles of the free surface, basis.
         material: Density over the time step [kg/(m^3 s)], and viscosity [Pa s].
-        divergence: Divergence of the predicted velocity, shape (n,) [1/s].
-        pressure: Coefficients of the last pressure, shape (n,) [Pa].
-        boundary: Pressure of the free surface, read there, shape (n,) [Pa].
+        divergence: Values of the divergence of the predicted velocity at the particles, shape (n,) [1/s].
+        pressure: Coefficients of the last pressure in the basis, shape (n,) [Pa].
+        boundary: Values of the pressure of the free surface, read there, shape (n,) [Pa].
 
     Returns:
-        Coefficients of phi and pressure at the end of the step, shape (n,) each [Pa], and number of iterations.
+        Coefficients of phi, values of the pressure at the end of the step at the particles, shape (n,) each [Pa], and
+        number of iterations.
 
     Raises:
         SolveFailed: The linear solve failed.

@@ -49,7 +49,8 @@ def forecast_parts(case: "BoardDropCase") -> dict[str, PartForecast]:
     """Return the forecast of every part of the mesh with all joints fine, by name such as "board" or "solder".
 
     Returns:
-        Part name -> number of hexahedra, critical time step [s], cost of an update, and whether the forces are linear.
+        Part name -> number of hexahedra, critical time step [s] (with mass scaling, too), cost of an update in
+        updates of an assembled elastic element, and whether the forces are linear.
     """
     from reflowshock.meshing.board.estimate import count_elements
 

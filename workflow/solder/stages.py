@@ -160,7 +160,7 @@ def judge_joint(metrics: Numbers, verdict: str, effects: Mapping[str, Any]) -> F
     A package that is pulled off leaves an open joint. This is a valid result, checked by the remaining drops.
 
     Args:
-        metrics: Name -> value and SI unit.
+        metrics: Name -> (value, SI unit), such as ``volume_drift`` and ``width_error``; missing ones are not checked.
         verdict: Verdict on the shape, such as "ok" or "open".
         effects: Name of an effect -> its decision: ``on``, ``why`` and, if predicted, ``influence``.
 

@@ -20,11 +20,12 @@ def verdict_of(drop: JudgedDrop) -> dict[str, Any]:
         drop: Histories, metrics and limits of a drop that was run.
 
     Returns:
-        Record of the verdict. ``design`` is the verdict on the package and ``criterion`` the name of the criterion that
-        decides it, None if none applies. ``criteria`` is the list of ``Judgement.record``. ``joints`` contains the
-        ``verdict`` of each joint by the limit with the smallest ``margin``, and ``joint`` the joint with the smallest
-        one, or the critical joint if no joint has a margin. ``life`` is the shortest of all joints, and is present only
-        with a law of life.
+        Record of the verdict. ``design`` is the verdict on the package ("PASS", "FAIL" or "NO LIMIT") and ``criterion``
+        the name of the criterion that decides it, None if none applies. ``criteria`` is the list of
+        ``Judgement.record``. ``joints`` has a record for each joint: ``criterion``, ``value``, ``limit``, ``margin`` and
+        ``verdict`` of the limit with the smallest margin, and where they apply ``source`` and ``mesh``. ``joint`` is the
+        joint with the smallest margin, or the critical joint if none has a margin. ``life`` is the record of the
+        shortest life of all joints, and is present only with a law of life.
     """
     judgements = [criterion.judge(drop) for criterion in CRITERIA]
     verdicts = {judgement.verdict for judgement in judgements}
