@@ -22,9 +22,9 @@ def verdict_of(drop: JudgedDrop) -> dict[str, Any]:
     Returns:
         Record of the verdict. ``design`` is the verdict on the package ("PASS", "FAIL" or "NO LIMIT") and ``criterion``
         the name of the criterion that decides it, None if none applies. ``criteria`` is the list of
-        ``Judgement.record``. ``joints`` has a record for each joint: ``criterion``, ``value``, ``limit``, ``margin`` and
-        ``verdict`` of the limit with the smallest margin, and where they apply ``source`` and ``mesh``. ``joint`` is the
-        joint with the smallest margin, or the critical joint if none has a margin. ``life`` is the record of the
+        ``Judgement.record``. ``joints`` has a record for each joint: ``criterion``, ``value``, ``limit``, ``margin``
+        and ``verdict`` of the limit with the smallest margin; ``source`` and ``mesh`` where they apply. ``joint`` is
+        the joint with the smallest margin, or the critical joint if none has a margin. ``life`` is the record of the
         shortest life of all joints, and is present only with a law of life.
     """
     judgements = [criterion.judge(drop) for criterion in CRITERIA]
