@@ -116,9 +116,7 @@ def run(
         bool, typer.Option("--fail-on-verdict", help="exit code 3 if the verdict on the design is FAIL")
     ] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", "-n", help="show what would run and its cost, as plan")] = False,
-    no_error: Annotated[
-        bool, typer.Option("--no-error", help=f"estimate no discretisation errors (--set {WITHOUT_ERRORS})")
-    ] = False,
+    no_error: Annotated[bool, typer.Option("--no-error", help=f"estimate no errors ({WITHOUT_ERRORS})")] = False,
 ) -> None:
     """Run all stages that are missing, stale or damaged; ends with the verdict on the design.
 

@@ -16,6 +16,8 @@ from reflowshock.fem.loads.load import Checkpointed, Load, Loaded
 from reflowshock.fem.loads.pretension import Pretension
 from reflowshock.fem.model.body import Body
 
+WEAK = 1e-4  # share of its velocity that a drag acting once in a window takes from a node
+
 
 class RayleighDamping(Load):
     """Rayleigh damping: -alpha M v at the middle of the step, -beta K v half a step late; v is relative to the table.
@@ -126,10 +128,19 @@ class WindowDrag(Load):
         self._mobility = np.empty((0, 3))
 
     @classmethod
-    def once_a_window(cls, loads: Sequence[Load], steps: int) -> list[Load]:
-        """Return loads with purely mass-proportional damping replaced by a drag that acts once in ``steps`` steps."""
+    def once_a_window(cls, loads: Sequence[Load], steps: int, window: float = 0.0) -> list[Load]:
+        """Return loads with weak, purely mass-proportional damping replaced by a drag that acts once in a window.
+
+        Args:
+            loads: Loads of a model.
+            steps: Steps of a window.
+            window: Duration of a window [s], in which the drag may change velocities by a share of ``WEAK``; zero
+                if it is known to be short enough.
+        """
         return [
-            cls(load.mass, steps) if isinstance(load, RayleighDamping) and not load.stiffness and steps > 1 else load
+            cls(load.mass, steps)
+            if isinstance(load, RayleighDamping) and not load.stiffness and steps > 1 and load.mass * window <= WEAK
+            else load
             for load in loads
         ]
 

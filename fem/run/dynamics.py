@@ -162,8 +162,10 @@ def make_participants(comms: Communicators, problem: DynamicProblem, models: Mod
         coupled = couple(comms, bodies, loads, steps.plan, scheme)
     else:
         [(role, body)] = bodies.items()
-        single = loads[role] if problem.request.implicit else WindowDrag.once_a_window(loads[role], steps.plan.substeps)
-        motion = _make_motion(comms.models[role], body, single, steps.plan.step, problem.request)
+        single, plan = loads[role], steps.plan
+        if not problem.request.implicit:
+            single = WindowDrag.once_a_window(single, plan.substeps, plan.window)
+        motion = _make_motion(comms.models[role], body, single, plan.step, problem.request)
         coupled = CoupledRun({role: SingleModel(motion, steps.plan)}, [])
     for participant in coupled.participants.values():
         if any(problem.request.initial_velocity):

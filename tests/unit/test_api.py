@@ -56,7 +56,7 @@ def test_a_wrong_key_names_the_nearest():
 
 def test_plan(tmp_path):
     plan = reflowshock.Case.load(BGA).plan(tmp_path / "run")
-    assert list(plan.stages) == ["geometry", "reflow", "surface", "solder_mesh", "shock", "report"]
+    assert list(plan.stages) == ["geometry", "reflow", "surface", "solder_mesh", "shock", "errors", "report"]
     assert all(stage.runs and stage.why == "no product yet" for stage in plan.stages.values())
     assert plan.seconds > 1.0
     assert plan.effects["gravity"]["why"]
