@@ -22,6 +22,7 @@ from reflowshock.fem.output.ranking import (
     PLASTIC_WORK,
     VON_MISES,
     critical_joint,
+    has_flow,
     joint_figures,
     ranking_measure,
 )
@@ -153,11 +154,6 @@ def _joint_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
     return values | _flow_metrics(arrays)
 
 
-def _has_flow(arrays: Mapping[str, NDArray]) -> bool:
-    """Return whether the solder of a run may yield."""
-    return "plastic_strain_max" in arrays
-
-
 def _acceleration_metrics(arrays: Mapping[str, NDArray], request: RunInput) -> dict[str, Any]:
     """Return the peak filtered accelerations of package and watch points."""
     pulse, low_pass = shock_pulse(request.shock).pulse, request.shock.filter
@@ -176,7 +172,7 @@ def _response_metrics(modes: ModeTable | None, shock: Shock, end: float) -> dict
 
 def _flow_metrics(arrays: Mapping[str, NDArray]) -> dict[str, Any]:
     """Return the largest plastic work density and plastic strain of all joints; empty if solder does not yield."""
-    if not _has_flow(arrays):
+    if not has_flow(arrays):
         return {}
     return {
         "peak_plastic_work_density": quantity(float(PLASTIC_WORK.peaks(arrays).max()), "J/m^3"),

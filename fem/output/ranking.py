@@ -49,6 +49,11 @@ OUTER_FIBRE = Measure("outer_fibre", "outer-fibre stress", "Pa")
 PLASTIC_FLOW = {"layer_plastic_strain": PLASTIC_STRAIN, "layer_plastic_work": PLASTIC_WORK}  # if solder yields
 
 
+def has_flow(arrays: Arrays) -> bool:
+    """Return whether the solder of a shock may yield, from the arrays of its ``history.npz``."""
+    return "plastic_strain_max" in arrays
+
+
 def joint_figures(arrays: Arrays, joint: int) -> dict[str, tuple[float, str]]:
     """Return the peaks over time of stresses and section forces on the worse pad of a joint.
 
@@ -62,7 +67,7 @@ def joint_figures(arrays: Arrays, joint: int) -> dict[str, tuple[float, str]]:
         ``section_torsion_moment`` and ``section_bending_moment`` [N m].
     """
     sections = np.stack([arrays[f"section_{end}"][:, joint] for end in ENDS])
-    flows = PLASTIC_FLOW if "plastic_strain_max" in arrays else {}
+    flows = PLASTIC_FLOW if has_flow(arrays) else {}
     measures = {"peel_stress": PEEL, "layer_von_mises": VON_MISES, **flows, "outer_fibre_stress": OUTER_FIBRE}
     forces = {
         "section_axial_force": (float(sections[..., 0].max()), "N"),

@@ -72,7 +72,7 @@ def expected_search(case: "BoardDropCase") -> float:
     Raises:
         PulseError: The table of the pulse cannot be read.
     """
-    return _expected_end(case, 1.25 if decided(case).shock.damping.acts else 0.75)
+    return _expected_end(case, 1.25 if case.shock.damping.acts else 0.75)
 
 
 def _expected_end(case: "BoardDropCase", periods: float) -> float:

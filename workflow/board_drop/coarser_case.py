@@ -6,7 +6,6 @@ The search keeps the layers of board, substrate, die and copper and those of the
 from math import floor
 
 from reflowshock.parameters import Values, with_values
-from reflowshock.workflow.board_drop.board_deflection import decided
 from reflowshock.workflow.package.case import BoardDropCase
 
 SEARCH = 2.0  # element size of the search for critical joints, relative to the case
@@ -41,7 +40,7 @@ def needs_search(case: BoardDropCase) -> bool:
         case: Case of the run.
     """
     shock = case.shock
-    finds_end = shock.duration == "auto" and decided(case).shock.damping.acts and not case.thermal
+    finds_end = shock.duration == "auto" and case.shock.damping.acts and not case.thermal
     return "two_scale" in shock.numerics.modes and (shock.coupling.fine_joints == "critical" or finds_end)
 
 

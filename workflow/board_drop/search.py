@@ -3,7 +3,6 @@
 from dataclasses import replace
 from pathlib import Path
 
-from reflowshock.workflow.board_drop.board_deflection import decided
 from reflowshock.workflow.board_drop.coarser_case import needs_search, search_case
 from reflowshock.workflow.board_drop.fine_joints import (
     FineJoints,
@@ -48,7 +47,7 @@ def find_fine_joints(run: Run[BoardDropCase], folder: Path) -> FineJoints:
     history = folder / FOLDER / "history.npz"
     if fine.names == "critical":
         fine = most_stressed(history, case.shock.coupling.critical_joints)
-    if case.shock.duration == "auto" and decided(case).shock.damping.acts:
+    if case.shock.duration == "auto" and case.shock.damping.acts:
         fine = with_end(fine, history)
     write_fine_joints(folder, fine)
     return fine

@@ -12,7 +12,7 @@ from reflowshock.workflow.board_drop.shock_cooling import with_initial_stress
 from reflowshock.workflow.case.run import Run
 from reflowshock.workflow.package.case import BoardDropCase
 from reflowshock.workflow.process.fem_launch import run_fem
-from reflowshock.workflow.process.products import read_json
+from reflowshock.workflow.process.products import read_json, simulated_time
 
 MODES = {"two_scale": "two-scale", "dns": "DNS"}
 IDENTICAL_TITLE = "identical joints"
@@ -34,7 +34,7 @@ def run_mode(run: Run[BoardDropCase], folder: Path, mode: str, fine: FineJoints,
     chosen = fine.names if mode == "two_scale" else "all"
     case = with_value(run.case, "shock.coupling.fine_joints", chosen)
     request = shock_request(case, mode, (_mesh(run, f"{prefix}assembly"), _mesh(run, f"{prefix}joints")))
-    if not prefix and mode == next(name for name in MODES if name in run.case.shock.numerics.modes):
+    if not prefix and mode == main_mode(run.case):
         request["shock"]["modes"] = run.case.shock.modes
     request |= _end_of_shock(run, folder.parent, fine)
     if mode == "two_scale" and needs_coarse_joints(case.shock.coupling):
@@ -42,6 +42,11 @@ def run_mode(run: Run[BoardDropCase], folder: Path, mode: str, fine: FineJoints,
     request["checkpoints"] = str(run.checkpoints("shock").resolve() / folder.name)
     request = with_initial_stress(run, folder.parent, request, prefix)
     run_fem(run, folder, request, f"shock, {MODES[mode]}" + (f", {IDENTICAL_TITLE}" if prefix else ""))
+
+
+def main_mode(case: BoardDropCase) -> str:
+    """Return the mode whose results represent a drop: "two_scale" if it is run, otherwise "dns"."""
+    return next(mode for mode in MODES if mode in case.shock.numerics.modes)
 
 
 def _end_of_shock(run: Run[BoardDropCase], folder: Path, fine: FineJoints) -> dict:
@@ -54,8 +59,7 @@ def _end_of_shock(run: Run[BoardDropCase], folder: Path, fine: FineJoints) -> di
     result = folder / run.case.shock.numerics.modes[0] / "result.json"
     if not result.exists():
         return {"settles": True} if fine.end is None else {"end": fine.end}
-    model = read_json(result)["model"]
-    return {"end": model["window"] * model["windows"]}
+    return {"end": simulated_time(read_json(result))}
 
 
 def _mesh(run: Run[BoardDropCase], name: str) -> Path:

@@ -12,13 +12,12 @@ from reflowshock.parameters import Values, with_values
 from reflowshock.workflow.board_drop.board_deflection import expected_duration
 from reflowshock.workflow.board_drop.coarser_case import coarser, fewer_layers
 from reflowshock.workflow.board_drop.fine_joints import read_fine_joints
-from reflowshock.workflow.board_drop.shock_launch import MODES
+from reflowshock.workflow.board_drop.shock_launch import main_mode
 from reflowshock.workflow.package.case import BoardDropCase
-from reflowshock.workflow.process.products import read_json
-from reflowshock.workflow.store.companions import COARSEST, HALF_WINDOW, SIZES, size_name
+from reflowshock.workflow.process.products import read_json, simulated_time
+from reflowshock.workflow.store.companions import CHEAP, COARSEST, HALF_WINDOW, SIZES, size_name
 
 LEAST_END = 0.5  # least duration of one model, over that of two, for an error of two scales
-CHEAP = 0.3  # largest cost of one model on the coarsest mesh, over that of the shock of the run
 
 
 def drop_companions(case: BoardDropCase, shock: Path | None) -> dict[str, BoardDropCase]:
@@ -36,7 +35,7 @@ def drop_companions(case: BoardDropCase, shock: Path | None) -> dict[str, BoardD
     if not case.estimates_errors:
         return {}
     copies = {size_name(size): resized_drop(case, shock, size) for size in SIZES}
-    main = _main_mode(case)
+    main = main_mode(case)
     end = _end(case, shock, main)
     if main == "two_scale" and not compares_models(case, end):
         copies |= _for_two_scales(with_values(case, {"shock.duration": end}), copies[COARSEST])
@@ -53,7 +52,7 @@ def resized_drop(case: BoardDropCase, shock: Path | None, size: float) -> BoardD
         shock: Folder of the results of its shock; None before, for the expected joints and end.
         size: Element size relative to the case; above one is coarser.
     """
-    main = _main_mode(case)
+    main = main_mode(case)
     same: Values = {
         "numerics.error.method": "off",
         "shock.coupling.fine_joints": _fine_joints(case, shock) if main == "two_scale" else "all",
@@ -68,11 +67,6 @@ def resized_drop(case: BoardDropCase, shock: Path | None, size: float) -> BoardD
         "shock.ranks.macro": None,
     }
     return with_values(case, same | coarser(case, size) | fewer_layers(case, size))
-
-
-def _main_mode(case: BoardDropCase) -> str:
-    """Return the first mode of a shock."""
-    return next(mode for mode in MODES if mode in case.shock.numerics.modes)
 
 
 def compares_models(case: BoardDropCase, end: float) -> bool:
@@ -135,6 +129,4 @@ def _end(case: BoardDropCase, shock: Path | None, mode: str) -> float:
         return case.shock.duration
     if shock is None:
         return expected_duration(case)
-    model = read_json(shock / mode / "result.json")["model"]
-    end: float = model["window"] * model["windows"]
-    return end
+    return simulated_time(read_json(shock / mode / "result.json"))

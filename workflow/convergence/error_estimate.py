@@ -18,7 +18,7 @@ from reflowshock.workflow.case.run import Findings, Run, metric
 from reflowshock.workflow.convergence.drop_companions import LEAST_END
 from reflowshock.workflow.convergence.figures import divergent_figures, reading_distances
 from reflowshock.workflow.convergence.grid_convergence import grid_convergence
-from reflowshock.workflow.process.products import read_json, write_json
+from reflowshock.workflow.process.products import read_json, simulated_time, write_json
 from reflowshock.workflow.store.companions import (
     COARSEST,
     FAILED,
@@ -237,10 +237,8 @@ def _has_two_scales(results: Path) -> bool:
 
 
 def _end(results: Path) -> float:
-    """Return the end of a run [s]."""
-    model = read_json(results / "result.json")["model"]
-    end: float = model["window"] * model["windows"]
-    return end
+    """Return the end of the run of a model [s]."""
+    return simulated_time(read_json(results / "result.json"))
 
 
 def _failure(run_folder: Path, name: str) -> str:

@@ -11,8 +11,8 @@ from reflowshock.units import from_si
 from reflowshock.workflow.board_drop.coarser_case import rounded_count
 from reflowshock.workflow.board_drop.duration import longest_duration
 from reflowshock.workflow.board_drop.shock_forecast import implicit_seconds
-from reflowshock.workflow.board_drop.shock_launch import MODES
 from reflowshock.workflow.convergence.convergence_study import ConvergenceStudy, Parameter, Quantity, StudyRun, resample
+from reflowshock.workflow.convergence.error_estimate import first_model
 from reflowshock.workflow.package.case import BoardDropCase, PackageCase
 from reflowshock.workflow.process.products import read_json
 from reflowshock.workflow.store.product import read_record
@@ -96,7 +96,7 @@ def _motion(case: Any, run_folder: Path) -> dict[str, Quantity]:
     """Return peaks and history of the critical joint, and deflection histories of board and die."""
     import numpy as np
 
-    folder = next(folder for mode in MODES if (folder := run_folder / "shock" / mode).is_dir())
+    folder = first_model(run_folder / "shock")
     with np.load(folder / "history.npz") as arrays:
         history = dict(arrays)
     metrics = read_json(folder / "result.json")["metrics"]

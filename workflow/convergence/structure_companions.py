@@ -11,11 +11,10 @@ from pathlib import Path
 
 from reflowshock.fem.problem.structure import Layer
 from reflowshock.parameters import Values, with_values
-from reflowshock.workflow.store.companions import COARSEST, HALF_WINDOW, SIZES, size_name
+from reflowshock.workflow.store.companions import CHEAP, COARSEST, HALF_WINDOW, SIZES, size_name
 from reflowshock.workflow.structure.case import StructureCase
 
 FEWEST = 4  # smallest number of elements along an axis that companions coarsen
-CHEAP = 0.3  # largest cost of one model on the coarsest mesh, over that of the shock of the run
 
 
 def structure_companions(case: StructureCase, _shock: Path | None) -> dict[str, StructureCase]:

@@ -1,7 +1,9 @@
 """Reading and writing of JSON products."""
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 
 def read_json(path: Path) -> dict:
@@ -11,6 +13,16 @@ def read_json(path: Path) -> dict:
         path: File to read, such as ``result.json``.
     """
     return json.loads(path.read_text(encoding="utf-8"))
+
+
+def simulated_time(result: Mapping[str, Any]) -> float:
+    """Return the time at which a run ended [s].
+
+    Args:
+        result: Content of its ``result.json``, of which ``model`` (``window`` [s], ``windows``) is read.
+    """
+    end: float = result["model"]["window"] * result["model"]["windows"]
+    return end
 
 
 def write_json(path: Path, content: dict | list) -> None:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from reflowshock.workflow.case.text import percent
+from reflowshock.workflow.process.products import simulated_time
 from reflowshock.workflow.report.tables import mode_name
 
 NEGLIGIBLE = 0.01  # smallest expected influence of a neglected effect that is reported
@@ -89,7 +90,7 @@ def scheme_share(name: str, results: Mapping[str, Mapping[str, Any]]) -> float |
 
 def _ends_early(results: Mapping[str, Mapping[str, Any]]) -> bool:
     """Return whether the second mode ends before the first one."""
-    ends = [result["model"]["window"] * result["model"]["windows"] for result in list(results.values())[:2]]
+    ends = [simulated_time(result) for result in list(results.values())[:2]]
     return bool(ends[1] < (1.0 - 1e-6) * ends[0])
 
 
@@ -110,8 +111,7 @@ def scheme_error(name: str, results: Mapping[str, Mapping[str, Any]]) -> str:
         return ""
     ours, theirs = (results[mode]["metrics"].get(name, {"value": None})["value"] for mode in (first, others[0]))
     if _ends_early(results):
-        model = results[others[0]]["model"]
-        return f"the {mode_name(others[0])} ends at {1e3 * model['window'] * model['windows']:.3g} ms"
+        return f"the {mode_name(others[0])} ends at {1e3 * simulated_time(results[others[0]]):.3g} ms"
     if isinstance(ours, str) or isinstance(theirs, str):
         return "none" if ours == theirs else f"{theirs} in the {mode_name(others[0])}"
     share = scheme_share(name, results)

@@ -17,6 +17,7 @@ FAILED = "failed.txt"  # message of a companion without a result
 UNTIL = ERRORS.follows[-1]  # last stage of a companion
 SIZES = (1.5, 2.0)  # element sizes of companions relative to the case
 HALF_WINDOW = "half_window"  # companion with the largest elements and half the coupling window
+CHEAP = 0.3  # largest cost of one model on the coarsest mesh, over that of the shock of the run
 
 Companions = Mapping[str, Point]
 
